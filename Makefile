@@ -1,0 +1,44 @@
+# Every target works as the first command on a fresh machine: .venv is made on demand.
+VENV ?= .venv
+BIN := $(VENV)/bin
+PYTHON ?= python3
+# One BLAS thread a process: the problems are small and the processes are many.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+DEMO ?= build/demo
+
+.PHONY: demo test check format bench clean
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+demo: $(VENV)/.installed
+	$(BIN)/facert demo $(DEMO) --overwrite
+	$(BIN)/facert train $(DEMO)/training.h5 -o $(DEMO)/model.safetensors --overwrite
+	$(BIN)/facert retarget $(DEMO)/performance.h5 $(DEMO)/retargeted.h5 --model $(DEMO)/model.safetensors --overwrite
+	$(BIN)/facert render $(DEMO)/retargeted.h5 $(DEMO)/faces.png --rig $(DEMO)/character.h5 --truth $(DEMO)/performance.h5 --overwrite
+	$(BIN)/facert plot $(DEMO)/retargeted.h5 $(DEMO)/curves.png --truth $(DEMO)/performance.h5 --overwrite
+	@echo "Look at $(DEMO)/faces.png and $(DEMO)/curves.png"
+
+test: $(VENV)/.installed
+	$(BIN)/python -m pytest -n 2
+
+check: $(VENV)/.installed
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: $(VENV)/.installed
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(VENV)/.installed
+	$(BIN)/python -m experiments.bench.training
+	$(BIN)/python -m experiments.bench.mapping
+
+clean:
+	rm -rf build $(VENV)

@@ -1,0 +1,78 @@
+"""What can go wrong, under one parent.
+
+A message names the file or argument, the field, what was expected, what was found, and the fix.
+Each class carries the exit status that the command line returns for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+class FacertError(Exception):
+    """Parent of every error that facert raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(FacertError):
+    """A file or an argument does not hold what it should.
+
+    Parameters
+    ----------
+    field : str
+        The part of the input that is at fault, e.g. ``"/target/params"``.
+    expected, found : str
+        What the field should hold, and what it holds.
+    fix : str
+        What the user can do about it.
+    where : str, optional
+        The file or argument; readers that know it later add it with `reading`.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self, field: str, expected: str, found: str, fix: str, where: str | None = None
+    ) -> None:
+        super().__init__(field, expected, found, fix, where)
+        self.field, self.expected, self.found, self.fix = field, expected, found, fix
+        self.where = where
+
+    def __str__(self) -> str:
+        """One line: ``where: field: expected ..., found .... Fix.``."""
+        where = f"{self.where}: " if self.where else ""
+        line = f"{where}{self.field}: expected {self.expected}, found {self.found}. {self.fix}"
+        return " ".join(line.split())
+
+
+class OutputExistsError(FacertError):
+    """The output file exists and ``--overwrite`` was not given."""
+
+    exit_code = 2
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(f"{path}: the file exists. Give another name, or --overwrite.")
+
+
+class NumericalError(FacertError):
+    """A computation has no finite answer, e.g. a matrix is not positive definite."""
+
+
+class DeviceError(FacertError):
+    """The device that was asked for is not there."""
+
+    exit_code = 2
+
+
+@contextmanager
+def reading(where: str | Path) -> Iterator[None]:
+    """Name the file in every `InputError` that is raised inside."""
+    try:
+        yield
+    except InputError as error:
+        if error.where is None:
+            error.where = str(where)
+        raise

@@ -1,0 +1,1 @@
+"""Gaussian processes: kernel, exact likelihood with its closed-form gradient."""

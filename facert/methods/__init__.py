@@ -1,0 +1,1 @@
+"""Every retargeting method behind one small interface."""

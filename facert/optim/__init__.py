@@ -1,0 +1,1 @@
+"""Optimisers, and the bridge between named tensors and flat vectors."""

@@ -1,0 +1,1 @@
+"""Pictures: rendered faces and curves."""
