@@ -1,3 +1,71 @@
-"""facert: carry a facial performance over to any character's rig, from a handful of poses."""
+"""facert: carry a facial performance over to any character's rig, from a handful of poses.
+
+    import facert
+
+    take = facert.read_take("take.h5")
+    retargeter = facert.train(take)
+    retargeter.save("model.safetensors")
+    result = facert.load("model.safetensors").retarget(facert.read_take("new.h5"))
+    facert.write_take(result, "result.h5")
+
+The public names are loaded when they are first used: torch takes its time.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from facert.data import Controls, Rig, Source, Take
+    from facert.errors import FacertError, InputError
+    from facert.io.formats import read_rig_file as read_rig
+    from facert.io.formats import read_take_file as read_take
+    from facert.io.formats import write_take_file as write_take
+    from facert.retargeter import Retargeter, load, train
+    from facert.settings import Settings
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Controls",
+    "FacertError",
+    "InputError",
+    "Retargeter",
+    "Rig",
+    "Settings",
+    "Source",
+    "Take",
+    "load",
+    "read_rig",
+    "read_take",
+    "train",
+    "write_take",
+]
+
+_HOMES = {
+    "Controls": ("facert.data", "Controls"),
+    "FacertError": ("facert.errors", "FacertError"),
+    "InputError": ("facert.errors", "InputError"),
+    "Retargeter": ("facert.retargeter", "Retargeter"),
+    "Rig": ("facert.data", "Rig"),
+    "Settings": ("facert.settings", "Settings"),
+    "Source": ("facert.data", "Source"),
+    "Take": ("facert.data", "Take"),
+    "load": ("facert.retargeter", "load"),
+    "read_rig": ("facert.io.formats", "read_rig_file"),
+    "read_take": ("facert.io.formats", "read_take_file"),
+    "train": ("facert.retargeter", "train"),
+    "write_take": ("facert.io.formats", "write_take_file"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'facert' has no attribute {name!r}")
+    module, attribute = _HOMES[name]
+    return getattr(importlib.import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

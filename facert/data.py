@@ -248,6 +248,8 @@ class Rig:
         Triangles.
     units : str
         Unit of length; empty when unknown.
+    colours : array, shape (V, 3), optional
+        Red, green and blue of every vertex, 0 to 1; for pictures only.
     """
 
     neutral: FloatArray
@@ -255,6 +257,7 @@ class Rig:
     names: tuple[str, ...]
     faces: IntArray
     units: str = ""
+    colours: FloatArray | None = None
 
     def __post_init__(self) -> None:
         neutral = _float_array(self.neutral, "/neutral")
@@ -291,7 +294,21 @@ class Rig:
             shapes=_frozen(shapes),
             names=names,
             faces=_frozen(faces.astype(np.int64)),
+            colours=self._colours(len(neutral)),
         )
+
+    def _colours(self, vertices: int) -> FloatArray | None:
+        if self.colours is None:
+            return None
+        colours = _float_array(self.colours, "/colours")
+        if colours.shape != (vertices, 3) or not ((colours >= 0) & (colours <= 1)).all():
+            raise InputError(
+                "/colours",
+                f"({vertices}, 3) between 0 and 1",
+                f"shape {colours.shape}, or values outside",
+                "Give red, green and blue of every vertex, or leave the colours out.",
+            )
+        return _frozen(colours)
 
     def deform(self, params: FloatArray) -> FloatArray:
         """Vertices (T, V, 3) for parameters (T, P)."""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import facert
-from facert.cli import console
+from facert.cli import console, convert, demo, inspect, plot, render, retarget, simulate, train
 from facert.errors import FacertError
 
 app = typer.Typer(
@@ -36,6 +36,16 @@ def options(
 ) -> None:
     """Options before the command."""
     console.configure(quiet, verbose)
+
+
+app.command("train")(train.command)
+app.command("retarget")(retarget.command)
+app.command("convert")(convert.command)
+app.command("inspect")(inspect.command)
+app.command("simulate")(simulate.command)
+app.command("demo")(demo.command)
+app.command("render")(render.command)
+app.command("plot")(plot.command)
 
 
 def main() -> None:

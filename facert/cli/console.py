@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 
 from rich.console import Console
-from rich.logging import RichHandler
 
 # Rich honours NO_COLOR and drops styles when the stream is not a terminal.
 out = Console(soft_wrap=True, highlight=False)
@@ -14,9 +13,16 @@ err = Console(stderr=True, soft_wrap=True, highlight=False)
 log = logging.getLogger("facert")
 
 
+class _StderrHandler(logging.Handler):
+    """One line a record; Rich's own handler would cut long lines at 80 columns."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        warning = record.levelno >= logging.WARNING
+        prefix = "warning: " if warning else ""
+        err.print(prefix + self.format(record), style="yellow" if warning else None, markup=False)
+
+
 def configure(quiet: bool, verbose: bool) -> None:
     """Send the package's log to stderr: warnings only, notes (default) or details."""
-    level = logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO
-    handler = RichHandler(console=err, show_time=False, show_path=False, show_level=False)
-    log.handlers[:] = [handler]
-    log.setLevel(level)
+    log.handlers[:] = [_StderrHandler()]
+    log.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)

@@ -1,0 +1,167 @@
+"""Checkpoints of a training run, from which it continues as if it had not stopped."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+import facert
+from facert.data import FloatArray
+from facert.errors import InputError, OutputExistsError
+from facert.gplvm.training import Monitor, Progress
+from facert.io.tensors import read_tensors, write_tensors
+from facert.optim.base import State
+
+log = logging.getLogger(__name__)
+
+FORMAT = "facert-checkpoint"
+_MEMORY = "memory."
+
+
+def checkpoint_path(model: Path) -> Path:
+    """Where the checkpoint of a model file in training lies: beside it."""
+    return model.with_suffix(".checkpoint.safetensors")
+
+
+class CheckpointFile(Monitor):
+    """Keeps the latest progress in a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; replaced whole at every checkpoint, so that it is never half-written.
+    resume : bool
+        Continue from the file if it is there.
+    """
+
+    def __init__(self, path: Path, resume: bool) -> None:
+        if path.exists() and not resume:
+            log.warning("%s is of an earlier run and will be replaced; --resume continues it", path)
+        self.path, self._resume = path, resume
+        self._fingerprint = ""
+
+    def resume(self, fingerprint: str) -> Progress | None:
+        """The file's progress, None when there is no file.
+
+        Raises
+        ------
+        InputError
+            When the file belongs to a run on other data or with other settings.
+        """
+        self._fingerprint = fingerprint
+        if not self._resume:
+            return None
+        if not self.path.exists():
+            log.warning("no checkpoint %s: training begins anew", self.path)
+            return None
+        arrays, metadata = read_tensors(self.path, FORMAT)
+        if metadata.get("fingerprint") != fingerprint:
+            raise InputError(
+                "fingerprint",
+                "a checkpoint of the same take and settings",
+                "one of another run",
+                "Give the options of that run, or train without --resume.",
+                str(self.path),
+            )
+        return _progress(arrays, str(self.path))
+
+    def checkpoint(self, progress: Progress) -> None:
+        """Write the progress, replacing the last."""
+        state = progress.state
+        arrays = {
+            "x": state.x,
+            "curve": np.array(progress.curve),
+            "scalars": np.array([state.value, state.gradient_norm, float(state.iterations)]),
+            **{_MEMORY + name: array for name, array in state.memory.items()},
+        }
+        metadata = {
+            "format": FORMAT,
+            "format_version": 1,
+            "created_by": f"facert {facert.__version__}",
+            "fingerprint": self._fingerprint,
+        }
+        write_tensors(self.path, arrays, metadata, overwrite=True)
+
+    def remove(self) -> None:
+        """Delete the file: the model is complete."""
+        self.path.unlink(missing_ok=True)
+
+
+class CurveLog(Monitor):
+    """Writes the curve to a CSV file, one line an iteration, as training goes.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    OutputExistsError
+        When it exists and `overwrite` is false.
+    """
+
+    def __init__(self, path: Path, overwrite: bool) -> None:
+        if path.exists() and not overwrite:
+            raise OutputExistsError(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Line buffering: the log can be followed, and survives a killed run.
+        self._file = path.open("w", encoding="utf-8", buffering=1)
+        self._file.write("iteration,objective,gradient_norm,seconds\n")
+        self._began = time.perf_counter()
+
+    def iteration(self, state: State) -> None:
+        """Write one line."""
+        seconds = time.perf_counter() - self._began
+        self._file.write(
+            f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
+        )
+
+
+class Monitors(Monitor):
+    """Several monitors as one; the first that knows where to resume decides.
+
+    Parameters
+    ----------
+    *parts : Monitor
+        Called in this order.
+    """
+
+    def __init__(self, *parts: Monitor) -> None:
+        self.parts = parts
+
+    def resume(self, fingerprint: str) -> Progress | None:
+        """The first part's progress that is not None."""
+        found = [part.resume(fingerprint) for part in self.parts]
+        return next((progress for progress in found if progress), None)
+
+    def iteration(self, state: State) -> None:
+        """Tell every part."""
+        for part in self.parts:
+            part.iteration(state)
+
+    def checkpoint(self, progress: Progress) -> None:
+        """Tell every part."""
+        for part in self.parts:
+            part.checkpoint(progress)
+
+
+def _progress(arrays: Mapping[str, FloatArray], where: str) -> Progress:
+    try:
+        value, gradient_norm, iterations = arrays["scalars"]
+        x, curve = arrays["x"], arrays["curve"]
+    except (KeyError, ValueError):
+        raise InputError(
+            "the arrays", "x, curve and scalars", ", ".join(arrays), "Train anew.", where
+        ) from None
+    memory = {
+        name.removeprefix(_MEMORY): array
+        for name, array in arrays.items()
+        if name.startswith(_MEMORY)
+    }
+    state = State(x, float(value), float(gradient_norm), int(iterations), memory)
+    return Progress(state, tuple(curve.tolist()))

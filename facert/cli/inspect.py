@@ -1,0 +1,94 @@
+"""``facert inspect``: what is in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from facert.cli import console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def command(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A take, a rig or a model, in any format.")
+    ],
+    target: Annotated[
+        str | None, typer.Option(help="Which of several targets of an .npz track.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+) -> None:
+    """Show what is in a file: units, rates, names, gaps, labels, active channels."""
+    import json
+
+    facts = _facts(path, target, shapes)
+    if as_json:
+        typer.echo(json.dumps({"file": str(path), **facts}, indent=2, ensure_ascii=False))
+    else:
+        console.out.print(_table(path.name, facts), soft_wrap=False)
+
+
+def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]:
+    """What a file holds, ready for JSON."""
+    if path.suffix.lower() == ".safetensors":
+        from facert.retargeter import load
+
+        return {"kind": "model", **load(path).facts}
+    from dataclasses import asdict
+
+    from facert.inspection import summarise
+    from facert.io.formats import read_any
+
+    return asdict(summarise(read_any(path, target=target, shapes=shapes, fps=None)))
+
+
+def _table(title: str, facts: Mapping[str, Any]) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    # Text, not str: a name in brackets is no markup.
+    table = Table(title=Text(title), title_justify="left", box=box.SIMPLE, show_header=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, text in _lines(facts):
+        table.add_row(label, Text(text))
+    return table
+
+
+def _lines(facts: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Label and text of every fact that says something, parts below their whole."""
+    for key, value in facts.items():
+        label = prefix + key.replace("_", " ")
+        if isinstance(value, Mapping):
+            yield from _lines(value, f"{label} ")
+        elif value not in ("", (), [], None):
+            yield label, f"{value:.1%}" if key == "missing" else _text(value)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        count = f"({len(value)}) " if value and isinstance(value[0], str) else ""
+        return count + ", ".join(map(_part, value))
+    return str(value)
+
+
+def _part(value: Any) -> str:
+    """An entry of a list: a name with its share, a low and a high limit, or anything plain."""
+    if isinstance(value, Mapping):
+        return f"{value['name']} {value['missing']:.1%}"
+    if isinstance(value, (list, tuple)):
+        return " to ".join(map(_text, value))
+    return _text(value)

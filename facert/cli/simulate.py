@@ -1,0 +1,72 @@
+"""``facert simulate``: a capture whose truth is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facert.cli import console
+
+
+def command(
+    rig: Annotated[
+        Path, typer.Argument(metavar="RIG", help="The actor: a rig file, .npz or folder of .obj.")
+    ],
+    weights: Annotated[
+        Path,
+        typer.Argument(metavar="WEIGHTS", help="Recorded weights, e.g. a Live Link Face .csv."),
+    ],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="The take to write, .h5 or .csv.")],
+    markers: Annotated[int, typer.Option(min=1, help="How many vertices serve as markers.")] = 40,
+    vertices: Annotated[
+        str | None,
+        typer.Option(metavar="I,J,...", help="These vertices instead, counted from 0."),
+    ] = None,
+    noise: Annotated[
+        float,
+        typer.Option(min=0.0, help="Share of the largest standard deviation of a coordinate."),
+    ] = 0.0,
+    missing: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of the markers' positions to hide.")
+    ] = 0.0,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="For markers, noise and gaps.")] = 0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+) -> None:
+    """Simulate a marker capture by driving a rig with recorded weights.
+
+    The weights that drive the rig are the target of the take: its truth.
+    """
+    from facert.capture import simulate_capture
+    from facert.errors import reading
+    from facert.io import formats
+
+    chosen = None if vertices is None else _indices(vertices)
+    actor, performance = formats.read_rig_file(rig, shapes), formats.read_take_file(weights)
+    with reading(weights):
+        take = simulate_capture(
+            actor,
+            performance,
+            markers=markers,
+            vertices=chosen,
+            noise=noise,
+            missing=missing,
+            seed=seed,
+        )
+    formats.write_take_file(take, output, overwrite)
+    poses = 0 if take.controls is None else len(take.controls.names)
+    console.out.print(
+        f"{output}: {len(take)} frames of {len(take.source.names)} markers, {poses} parameters",
+        markup=False,
+    )
+
+
+def _indices(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError as error:
+        raise typer.BadParameter("give numbers like 12,40,77", param_hint="--vertices") from error

@@ -1,0 +1,131 @@
+"""``facert train``: learn to retarget from a take and its poses."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+from facert.errors import InputError, OutputExistsError, reading
+
+if TYPE_CHECKING:
+    from facert.data import Take
+    from facert.gplvm.training import Monitor
+    from facert.retargeter import Retargeter
+
+DEFAULT_MODEL = Path("model.safetensors")
+
+
+def command(
+    take: Annotated[
+        Path | None,
+        typer.Argument(help="Take with poses in some frames; by default the built-in one."),
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Model file to write.")
+    ] = DEFAULT_MODEL,
+    method: Annotated[
+        str | None, typer.Option(help="ssgplvm (default), or sgplvm: labelled frames alone.")
+    ] = None,
+    labels: Annotated[
+        int | None, typer.Option(help="Use only so many of the posed frames, drawn at random.")
+    ] = None,
+    unlabelled: Annotated[
+        int | None, typer.Option(help="Unlabelled frames, and poses, to learn from [100].")
+    ] = None,
+    latent_dim: Annotated[int | None, typer.Option(help="Latent dimensions [8].")] = None,
+    neighbours: Annotated[
+        int | None, typer.Option(help="Neighbours in the local linear prior [8].")
+    ] = None,
+    sigma_c: Annotated[
+        float | None,
+        typer.Option(help="Capture noise, in units of the largest marker deviation [0.1]."),
+    ] = None,
+    optimizer: Annotated[
+        str | None, typer.Option(help="lbfgs (default) or scg, the paper's.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="For every random choice [0].")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu (default) or cuda.")] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="TOML file of settings; options given here come before it.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue from the checkpoint beside the output.")
+    ] = False,
+    curve: Annotated[
+        Path | None, typer.Option("--log", help="CSV file for the training curve.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace existing output files.")
+    ] = False,
+) -> None:
+    """Learn to retarget from a take's poses, its other frames, and old animation."""
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+    if output.suffix != ".safetensors":
+        raise InputError("--output", "a name ending in .safetensors", str(output), "Rename it.")
+    options = {
+        "method": method,
+        "labels": labels,
+        "unlabelled": unlabelled,
+        "latent_dim": latent_dim,
+        "neighbours": neighbours,
+        "sigma_c": sigma_c,
+        "optimizer": optimizer,
+        "seed": seed,
+        "device": device,
+    }
+
+    import facert
+    from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
+    from facert.cli.progress import ProgressBar
+    from facert.settings import Settings, read_settings
+
+    settings = Settings()
+    if config is not None:
+        with reading(config):
+            settings = settings.with_changes(read_settings(config))
+    with reading("the options"):
+        settings = settings.with_changes({k: v for k, v in options.items() if v is not None})
+
+    data = _read(take, target)
+    checkpoint = CheckpointFile(checkpoint_path(output), resume)
+    monitors: list[Monitor] = [checkpoint]
+    if curve is not None:
+        monitors.append(CurveLog(curve, overwrite))
+    with reading(take or "the built-in take"), ProgressBar() as bar:
+        retargeter = facert.train(data, settings, Monitors(*monitors, bar))
+    retargeter.save(output, overwrite)
+    if retargeter.figures["status"] != "interrupted":
+        checkpoint.remove()
+    _print_table(retargeter, output)
+
+
+def _read(path: Path | None, target: str | None) -> Take:
+    from facert.io.formats import read_take_file
+
+    if path is not None:
+        return read_take_file(path, target=target)
+    from facert.demo import training_take
+
+    console.log.info("no take given: training on the built-in demo take")
+    return training_take()
+
+
+def _print_table(retargeter: Retargeter, output: Path) -> None:
+    from rich.table import Table
+
+    figures = retargeter.figures
+    table = Table(title=f"{retargeter.settings.method} in {output}", show_header=False)
+    for name, value in figures.items():
+        shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+        if isinstance(value, float) and not math.isfinite(value):
+            shown = "-"
+        table.add_row(name, shown)
+    console.out.print(table)

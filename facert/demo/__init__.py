@@ -1,0 +1,16 @@
+"""A procedural actor and a differently built character, with performances; nothing to download.
+
+`build` holds the proportions of both heads, `clay`, `skin`, `parts` and `head` model them,
+`expressions` move them, `acting` directs the actor, `character` is the other rig, and `takes`
+records it all.
+"""
+
+from facert.demo.takes import (
+    actor_rig,
+    character_rig,
+    performance_take,
+    training_take,
+    write_demo,
+)
+
+__all__ = ["actor_rig", "character_rig", "performance_take", "training_take", "write_demo"]

@@ -1,0 +1,279 @@
+"""What the muscles do: one displacement of the whole mesh for each activation.
+
+Every field is made from the landmarks of a `Build`, so the same few lines move both heads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from facert.data import FloatArray
+from facert.demo.head import Head
+from facert.demo.parts import Tissue
+from facert.demo.skin import LID_EDGE, LIP_EDGE
+
+ACTIVATIONS = (
+    "brow_inner_up",
+    "brow_outer_up_L",
+    "brow_outer_up_R",
+    "brow_down_L",
+    "brow_down_R",
+    "blink_L",
+    "blink_R",
+    "squint",
+    "eye_wide",
+    "cheek_raise",
+    "nose_wrinkle",
+    "smile_L",
+    "smile_R",
+    "frown_L",
+    "frown_R",
+    "stretch",
+    "pucker",
+    "funnel",
+    "lips_press",
+    "upper_lip_up",
+    "lower_lip_down",
+    "mouth_left",
+    "mouth_right",
+    "jaw_open",
+    "jaw_left",
+    "jaw_right",
+)
+
+
+def expressions(head: Head) -> FloatArray:
+    """Displacements (26, V, 3) in cm of all `ACTIVATIONS`, each fully on."""
+    muscles = Muscles(head)
+    left = {
+        "brow_outer_up": muscles.brow_outer_up(),
+        "brow_down": muscles.brow_down(),
+        "blink": muscles.close_lids(0.82, 0.18),
+        "smile": muscles.smile(),
+        "frown": muscles.frown(),
+    }
+    sideways = muscles.mouth_left(), muscles.jaw_left()
+    both = {
+        "brow_inner_up": muscles.brow_inner_up(),
+        "squint": muscles.close_lids(0.12, 0.34),
+        "eye_wide": muscles.close_lids(-0.30, -0.10),
+        "cheek_raise": muscles.cheek_raise(),
+        "nose_wrinkle": muscles.nose_wrinkle(),
+        "stretch": muscles.stretch(),
+    }
+    shapes = {f"{name}_L": shape for name, shape in left.items()}
+    shapes |= {f"{name}_R": muscles.mirrored(shape) for name, shape in left.items()}
+    shapes |= {name: shape + muscles.mirrored(shape) for name, shape in both.items()}
+    shapes |= dict(zip(("mouth_left", "jaw_left"), sideways, strict=True))
+    shapes |= dict(zip(("mouth_right", "jaw_right"), map(muscles.mirrored, sideways), strict=True))
+    shapes |= {
+        "pucker": muscles.pucker(),
+        "funnel": muscles.funnel(),
+        "lips_press": muscles.lips_press(),
+        "upper_lip_up": muscles.upper_lip_up(),
+        "lower_lip_down": muscles.lower_lip_down(),
+        "jaw_open": muscles.jaw_open(),
+    }
+    return np.stack([shapes[name] for name in ACTIVATIONS])
+
+
+class Muscles:
+    """The displacement fields of one head; those of a pair act on the left side.
+
+    Parameters
+    ----------
+    head : Head
+    """
+
+    def __init__(self, head: Head) -> None:
+        self.head, self.build = head, head.build
+        self.rest = head.vertices
+        skin = head.tissue == Tissue.SKIN
+        # Ears and the back of the head stay where they are.
+        self.soft = skin * _smoothstep(self.rest[:, 2], -1.0, 2.5)
+        # The lids rest on the eyeball: only `close_lids` moves their edges.
+        for row, follow in zip(head.lids, (0.0, 0.0, 0.5, 0.85), strict=True):
+            self.soft[row] *= follow
+            self.soft[head.mirror[row]] *= follow
+        self.lower = self._lower_lip()
+        self.corner = np.array(
+            [
+                self.build.mouth.width * 1.04,
+                self.build.mouth.centre[1] + 0.65 * self.build.mouth.curve * self.build.mouth.width,
+            ]
+        )
+
+    def mirrored(self, shape: FloatArray) -> FloatArray:
+        """The same on the right side."""
+        return np.asarray(shape[self.head.mirror] * [-1.0, 1.0, 1.0])
+
+    def brow_inner_up(self) -> FloatArray:
+        """Inner brow up, towards the middle."""
+        x, y = self.build.brow.inner
+        return self._pull((x + 0.2, y + 0.1), (-0.12, 0.85, 0.1), 1.15)
+
+    def brow_outer_up(self) -> FloatArray:
+        """Outer two thirds of the brow up."""
+        (ax, ay), (ox, oy) = self.build.brow.arch, self.build.brow.outer
+        return self._pull(((ax + ox) / 2, (ay + oy) / 2), (0.05, 0.9, 0.05), 1.5)
+
+    def brow_down(self) -> FloatArray:
+        """Brow down and inwards, most at the inner end."""
+        (ix, iy), (ax, ay) = self.build.brow.inner, self.build.brow.arch
+        inner = self._pull((ix, iy), (-0.28, -0.6, 0.2), 1.0)
+        return inner + self._pull((ax, ay), (-0.15, -0.42, 0.05), 1.3)
+
+    def close_lids(self, upper: float, lower: float) -> FloatArray:
+        """Move the lids over the eyeball, each by its part of the opening."""
+        eye, lids = self.build.eye, self.head.lids
+        shape = np.zeros_like(self.rest)
+        edge = self.rest[lids[LID_EDGE]]
+        count = edge.shape[0]
+        opposite = (-np.arange(count)) % count  # the vertex above or below on the other lid
+        gap = edge[opposite] - edge
+        above = np.sin(2 * np.pi * np.arange(count) / count) > 0
+        share = np.where(above, upper, lower)[:, None]
+        for row, follow in enumerate((1.0, 1.0, 0.62, 0.12)):
+            shape[lids[row]] += follow * share * gap
+        # A straight path would cut through the ball: the lids pass in front of it and stay round.
+        travel = np.abs(share[:, 0] * gap[:, 1]) / (eye.upper + eye.lower)
+        for row, bulge in enumerate((0.10, 0.10, 0.30)):
+            shape[lids[row], 2] += bulge * eye.ball[2] * travel
+        return shape
+
+    def cheek_raise(self) -> FloatArray:
+        """Cheek up under the eye."""
+        x, y = self.build.cheek
+        return self._pull((x - 0.3, y + 0.5), (-0.05, 0.6, 0.32), 1.3)
+
+    def nose_wrinkle(self) -> FloatArray:
+        """Wing of the nose up, with lip and brow."""
+        x, y = self.build.nose
+        brow = self._pull(self.build.brow.inner, (-0.12, -0.25, 0.1), 0.9)
+        return brow + self._pull((x + 0.1, y), (0.12, 0.55, 0.05), 0.85)
+
+    def smile(self) -> FloatArray:
+        """Corner of the mouth out and up, the cheek follows."""
+        x, y = self.build.cheek
+        corner = self._pull(tuple(self.corner), (0.75, 0.85, -0.45), 1.25)
+        return corner + self._pull((x - 0.4, y), (0.1, 0.35, 0.38), 1.2)
+
+    def frown(self) -> FloatArray:
+        """Corner of the mouth down."""
+        return self._pull(tuple(self.corner), (0.12, -0.85, -0.1), 1.15)
+
+    def stretch(self) -> FloatArray:
+        """Corner of the mouth straight out."""
+        return self._pull(tuple(self.corner), (0.85, -0.12, -0.5), 1.3)
+
+    def pucker(self) -> FloatArray:
+        """Lips together and forward, as for a kiss."""
+        return self._narrow(0.42) + self._on_lips((0.0, 0.0, 0.65), 1.2)
+
+    def funnel(self) -> FloatArray:
+        """Lips forward and apart, as in "oh"."""
+        upper = (1 - self.lower)[:, None] * self._on_lips((0.0, 0.42, 0.55), 1.0)
+        lower = self.lower[:, None] * self._on_lips((0.0, -0.52, 0.55), 1.0)
+        return self._narrow(0.26) + upper + lower
+
+    def lips_press(self) -> FloatArray:
+        """The red of both lips rolls in to the line where they meet."""
+        mouth = self.build.mouth
+        line = mouth.curve * mouth.width * ((self.rest[:, 0] / mouth.width) ** 2 - 0.35)
+        height = self.rest[:, 1] - mouth.centre[1] - line
+        reach = self._around_lips(0.75)
+        roll = np.zeros_like(self.rest)
+        roll[:, 1] = -0.75 * np.clip(height, -1.2 * mouth.lower, 1.2 * mouth.upper) * reach
+        roll[:, 2] = -1.3 * mouth.fullness * reach
+        return roll
+
+    def upper_lip_up(self) -> FloatArray:
+        """Upper lip off the teeth."""
+        return (1 - self.lower)[:, None] * self._on_lips((0.0, 0.6, 0.08), 0.85)
+
+    def lower_lip_down(self) -> FloatArray:
+        """Lower lip off the teeth."""
+        return self.lower[:, None] * self._on_lips((0.0, -0.65, 0.05), 0.85)
+
+    def mouth_left(self) -> FloatArray:
+        """The whole mouth to the left."""
+        width = self.build.mouth.width
+        shift = self._pull((0.15 * width, self.build.mouth.centre[1]), (0.9, 0.0, 0.0), 2.1)
+        lift = self._pull(tuple(self.corner), (0.0, 0.15, -0.35), 1.2)
+        return shift + lift
+
+    def jaw_open(self) -> FloatArray:
+        """Jaw turned about its hinge."""
+        y, z = self.build.hinge
+        angle = self.build.jaw_angle
+        arm = self.rest - [0.0, y, z]
+        cos, sin = np.cos(angle), np.sin(angle)
+        turned = np.column_stack(
+            [
+                arm[:, 0] * (1 - 0.04),  # cheeks narrow as they lengthen
+                cos * arm[:, 1] - sin * arm[:, 2],
+                sin * arm[:, 1] + cos * arm[:, 2],
+            ]
+        )
+        return self._jaw()[:, None] * (turned - arm)
+
+    def jaw_left(self) -> FloatArray:
+        """Jaw to the left."""
+        return self._jaw()[:, None] * [0.65 * self.build.motion, 0.0, 0.0]
+
+    def _pull(self, centre: tuple[float, ...], way: ArrayLike, radius: float) -> FloatArray:
+        """Everything near a point of the front view moves by `way`, less further away."""
+        distance = np.linalg.norm(self.rest[:, :2] - centre, axis=1) / (radius * self._reach)
+        weight = self.soft * np.exp(-0.5 * distance**2)
+        return np.asarray(self.build.motion * weight[:, None] * np.asarray(way))
+
+    def _on_lips(self, way: ArrayLike, radius: float) -> FloatArray:
+        return np.asarray(self.build.motion * self._around_lips(radius)[:, None] * np.asarray(way))
+
+    def _around_lips(self, radius: float) -> FloatArray:
+        """1 in the middle of the mouth, falling to the corners and away from the lips."""
+        mouth = self.build.mouth
+        x = self.rest[:, 0] / (0.62 * mouth.width)
+        y = (self.rest[:, 1] - mouth.centre[1]) / (radius * (mouth.upper + mouth.lower))
+        return np.asarray(self.soft * np.exp(-0.5 * (x**2) ** 1.5 - 0.5 * y**2))
+
+    def _narrow(self, part: float) -> FloatArray:
+        """Corners of the mouth in and forward."""
+        width = self.build.mouth.width * part / self.build.motion
+        corner = self._pull(tuple(self.corner), (-width, 0.0, 0.35), 1.15)
+        return corner + self.mirrored(corner)
+
+    def _jaw(self) -> FloatArray:
+        """How far each vertex follows the jaw, (V,)."""
+        z, chin = self.build.hinge[1], self.build.chin[1]
+        front = _smoothstep(self.rest[:, 2], z - 0.5, z + 4.0)
+        neck = _smoothstep(self.rest[:, 1], chin - 3.2, chin - 0.6)
+        under = _smoothstep(self.rest[:, 2], z + 1.5, z + 5.5)
+        throat = under + (1 - under) * _smoothstep(self.rest[:, 1], chin, chin + 3.0)
+        skin = self.lower * front * neck * throat * (self.head.tissue == Tissue.SKIN)
+        return np.where(self.head.tissue == Tissue.JAW, 1.0, skin)
+
+    def _lower_lip(self) -> FloatArray:
+        """1 below the mouth and 0 above, (V,): a step at the lips, a slope on the cheeks."""
+        mouth, lips = self.build.mouth, self.head.lips
+        aside = np.maximum(np.abs(self.rest[:, 0]) - 0.4 * mouth.width, 0)
+        slope = 0.25 + 0.7 * aside
+        line = mouth.centre[1] + mouth.curve * mouth.width * 0.4
+        weight = _smoothstep(line - self.rest[:, 1], -slope, slope)
+        half = lips.shape[1] // 2
+        round_off = np.abs(np.cos(np.linspace(0, np.pi, lips.shape[1]))) ** 0.6
+        sign = np.sign(np.arange(lips.shape[1]) - half)
+        weight[lips[: LIP_EDGE + 4]] = 0.5 + 0.5 * sign * round_off
+        right = self.rest[:, 0] < 0
+        return np.where(right, weight[self.head.mirror], weight)
+
+    @property
+    def _reach(self) -> float:
+        """How wide a muscle acts, with the size of the mouth."""
+        return self.build.mouth.width / 2.4
+
+
+def _smoothstep(x: FloatArray, low: float | FloatArray, high: float | FloatArray) -> FloatArray:
+    t = np.clip((x - low) / (high - low), 0, 1)
+    return np.asarray(t * t * (3 - 2 * t))

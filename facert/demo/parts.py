@@ -1,0 +1,175 @@
+"""The pieces of a head: patches of triangles, left half, made from the proportions alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from facert.data import FloatArray, IntArray
+from facert.demo.build import Build, Colour
+from facert.demo.clay import ORIGIN, cast_from_front, cast_from_inside
+
+WHITE: Colour = (0.95, 0.93, 0.90)
+TOOTH: Colour = (0.93, 0.90, 0.83)
+PUPIL: Colour = (0.04, 0.03, 0.04)
+
+
+class Tissue(IntEnum):
+    """How a vertex follows the face: skin moves, the rest is on the skull or on the jaw."""
+
+    SKIN = 0
+    SKULL = 1
+    JAW = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A patch: vertices (V, 3), triangles (F, 3) seen anticlockwise, colours (V, 3)."""
+
+    vertices: FloatArray
+    faces: IntArray
+    colours: FloatArray
+    tissue: Tissue = Tissue.SKIN
+
+
+def strips(grid: IntArray, *, closed: bool = False) -> IntArray:
+    """Triangles between the neighbouring rows of a grid of vertex indices (R, n).
+
+    Anticlockwise when the columns run anticlockwise and the rows inwards; `closed` joins the
+    last column to the first.
+    """
+    if closed:
+        grid = np.column_stack([grid, grid[:, 0]])
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    return np.asarray(faces.reshape(-1, 3), dtype=np.int64)
+
+
+def eyeball(build: Build) -> Piece:
+    """Rings around the line of sight, with pupil, iris and white."""
+    eye, sides = build.eye, 20
+    edge = 0.02
+    angles = np.array(
+        [0.0, eye.pupil - edge, eye.pupil + edge, eye.iris - edge, eye.iris + edge, 0.8, 1.1, 1.5]
+    )
+    iris = np.array(build.palette.iris)
+    colours = np.array([PUPIL, PUPIL, iris, 0.55 * iris, WHITE, WHITE, WHITE, WHITE])
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    radius, depth = np.sin(angles[1:, None]), np.cos(angles[1:, None]) + 0 * turn
+    rings = np.stack([radius * np.cos(turn), radius * np.sin(turn), depth], axis=-1)
+    directions = np.vstack([[[0.0, 0.0, 1.0]], rings.reshape(-1, 3)])
+    grid = 1 + np.arange(rings.shape[0] * sides).reshape(-1, sides)
+    fan = np.column_stack([np.zeros(sides, dtype=int), grid[0], np.roll(grid[0], -1)])
+    return Piece(
+        directions * eye.ball + eye.centre,
+        np.vstack([fan, strips(grid[::-1], closed=True)]),
+        np.vstack([colours[:1], np.repeat(colours[1:], sides, axis=0)]),
+        Tissue.SKULL,
+    )
+
+
+def brow(build: Build) -> Piece:
+    """A ribbon of hair that lies on the skin."""
+    shape = build.brow
+    along = np.linspace(0, 1, 12)[:, None]
+    ends = np.array([shape.inner, shape.arch, shape.outer])
+    # A parabola through the inner end (0), the highest point (0.6) and the outer end (1).
+    line = (
+        ends[0] * (along - 0.6) * (along - 1) / 0.6
+        - ends[1] * along * (along - 1) / 0.24
+        + ends[2] * along * (along - 0.6) / 0.4
+    )
+    width = shape.thickness * np.minimum(1, 0.55 + 3 * along) * np.minimum(1, 2.2 * (1.08 - along))
+    rows = [line - width * step * np.array([0.0, 1.0]) for step in (1.0, 0.35, -0.35, -1.0)]
+    lift = np.repeat([-0.05, 0.16, 0.16, -0.05], len(along))
+    return _patch(np.stack(rows), lift, build, build.palette.hair)
+
+
+def teeth(build: Build) -> tuple[Piece, Piece]:
+    """The upper row on the skull and the lower row on the jaw."""
+    mouth = build.mouth
+    x = np.linspace(0, 0.82 * mouth.width, 8)
+    front = cast_from_front(np.array([mouth.centre]), build.blobs)[0, 2] - 0.75
+    z = front - 0.9 * mouth.width * (x / mouth.width / 1.1) ** 2
+    height = mouth.upper + mouth.lower
+
+    def row(top: float, bottom: float, tissue: Tissue) -> Piece:
+        y = mouth.centre[1] + np.array([bottom, top])
+        vertices = np.stack([np.stack([x, np.full_like(x, level), z], -1) for level in y])
+        colours = np.tile(TOOTH, (vertices.shape[0] * vertices.shape[1], 1))
+        grid = np.arange(2 * len(x)).reshape(2, -1)
+        return Piece(vertices.reshape(-1, 3), strips(grid), colours, tissue)
+
+    return (
+        row(0.5 * height, -0.26 * height, Tissue.SKULL),
+        row(-0.22 * height, -0.62 * height, Tissue.JAW),
+    )
+
+
+def ear(build: Build) -> Piece:
+    """A leaf with a hollow, at the side of the head."""
+    shape, rows, sides = build.ear, 10, 14
+    width, length = shape.reach
+    up = np.array([np.sin(shape.lean), np.cos(shape.lean), -0.15])
+    up /= np.linalg.norm(up)
+    back = np.cross(up, [0.35, 0.0, 0.94])
+    back *= np.sign(back[0]) / np.linalg.norm(back)
+    front = np.cross(back, up)
+    front *= np.sign(front[2])
+    level = np.cos(np.linspace(0.06, np.pi - 0.06, rows))[:, None]
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    leaf = np.sqrt(1 - level**2) * (1 - shape.point * 0.42 * (1 + level))
+    across, depth = leaf * np.cos(turn), 0.28 * leaf * np.sin(turn)
+    hollow = 0.42 * leaf * np.exp(-3 * (across**2 + (level + 0.1) ** 2)) * (depth > 0)
+    centre = np.array(shape.root) + np.sin(shape.lean) * length * 0.75 * up
+    vertices = (
+        centre
+        + width * across[..., None] * back
+        + length * (level + 0 * turn)[..., None] * up
+        + width * (depth - hollow)[..., None] * front
+    )
+    grid = np.arange(rows * sides).reshape(rows, sides)
+    right_handed = np.dot(np.cross(back, front), up) > 0
+    faces = strips(grid[:, ::-1] if right_handed else grid, closed=True)
+    skin, blush = np.array(build.palette.skin), np.array(build.palette.blush)
+    shade = np.clip(hollow * 1.2, 0, 0.8).reshape(-1, 1)
+    return Piece(vertices.reshape(-1, 3), faces, skin + shade * (blush - skin))
+
+
+def hair(build: Build) -> Piece:
+    """A cap of hair; its edge dips below the skin, which draws a clean hairline."""
+    shape, rows, sides = build.hair, 12, 22
+    crown = np.array(shape.crown) / np.linalg.norm(shape.crown)
+    left = np.array([1.0, 0.0, 0.0])
+    front = np.cross(left, crown)
+    turn = np.linspace(-np.pi / 2, np.pi / 2, sides)  # from the neck over the side to the brow
+    reach = shape.angle * (1 + 0.10 * shape.parting * np.cos(6 * turn))
+    reach *= 1 - shape.crest * np.cos(turn) ** 2
+    inwards = np.linspace(1, 0.04, rows)[:, None]
+    angle = reach * inwards
+    directions = (
+        np.cos(angle)[..., None] * crown
+        + (np.sin(angle) * np.cos(turn))[..., None] * left
+        + (np.sin(angle) * np.sin(turn))[..., None] * front
+    )
+    skin = cast_from_inside(directions.reshape(-1, 3), build.blobs).reshape(directions.shape)
+    locks = 1 + 0.16 * np.sin(13 * turn + 5 * inwards) * inwards
+    height = shape.thickness * np.sqrt(1 - inwards**4) * locks - 0.15 * inwards**6
+    vertices = skin + height[..., None] * directions
+    vertices[:, [0, -1], 0] = 0
+    grid = np.arange(rows * sides).reshape(rows, sides)
+    colours = np.tile(build.palette.hair, (grid.size, 1))
+    return Piece(vertices.reshape(-1, 3), strips(grid[::-1]), colours, Tissue.SKULL)
+
+
+def _patch(points: FloatArray, lift: ArrayLike, build: Build, colour: Colour) -> Piece:
+    """A grid in front view (R, n, 2), laid on the skin and lifted off it."""
+    flat = points.reshape(-1, 2)
+    vertices = cast_from_front(flat, build.blobs)
+    outwards = (vertices - ORIGIN) / np.linalg.norm(vertices - ORIGIN, axis=1, keepdims=True)
+    vertices = vertices + np.reshape(lift, (-1, 1)) * outwards
+    grid = np.arange(len(flat)).reshape(points.shape[:2])
+    return Piece(vertices, strips(grid), np.tile(colour, (len(flat), 1)))

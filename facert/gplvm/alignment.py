@@ -1,0 +1,36 @@
+"""Initial latent coordinates by semi-supervised manifold alignment (Ham, Lee and Saul 2005)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import eigh
+
+from facert.data import FloatArray
+
+
+def align(M: sparse.csr_array, latent_dim: int) -> FloatArray:
+    """Latent coordinates that satisfy the reconstruction constraints of both views best.
+
+    They are the eigenvectors of MᵀM next to the constant one, scaled to unit variance: labelled
+    frames, whose columns the two views share, tie the views together.
+
+    Parameters
+    ----------
+    M : csr_array, shape (constraints, N)
+        See `facert.gplvm.lle.constraint_matrix`.
+    latent_dim : int
+        q, less than N.
+
+    Returns
+    -------
+    array, shape (N, q)
+        Columns with mean 0 and variance 1, signs fixed so that the result is unique.
+    """
+    product = (M.T @ M).toarray()
+    _, vectors = eigh(product, subset_by_index=[1, latent_dim])
+    vectors -= vectors.mean(axis=0)
+    vectors /= vectors.std(axis=0)
+    largest = np.abs(vectors).argmax(axis=0)
+    aligned: FloatArray = vectors * np.sign(vectors[largest, np.arange(latent_dim)])
+    return aligned

@@ -1,0 +1,265 @@
+"""Source mapping: the latent position and the cleaned source of an observed frame, Eqs. (9)-(17).
+
+For one frame, with x̃ observed with variance R_d per dimension (infinite where nothing was seen,
+and including the previous frame's pull, Eq. 14), the paper minimises over x and z
+
+    Σ_d (x_d - b_d)²/(2 R_d) + |x - μ(z)|²/(2 σ_p²(z)) + d_x/2 log σ_p²(z) + |z|²/2.
+
+It is quadratic in x, whose minimum x* = μ - σ_p² w ∘ (μ - b) with w_d = 1/(σ_p² + R_d) leaves
+
+    F(z) = 1/2 Σ_d w_d (μ_d - b_d)² + d_x/2 log σ_p² + |z|²/2,
+
+a problem in q dimensions. `solve` runs Newton's method with the exact Hessian on many frames at
+once. Writing r = μ - b, s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and
+a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s), a' = ∂a/∂s = Σ w³ r² - d_x/(2s²):
+
+    ∇F  = J (w r) + a g + z
+    ∇²F = J diag(w) Jᵀ + a' g gᵀ - u gᵀ - g uᵀ - 2 a G K⁻¹ Gᵀ + Σ_i e_i ∇²k_i + I,
+
+where u = J (w² r) and e = α (w r) - 2 a K⁻¹ k collects the curvature of the kernel itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.gp.posterior import Posterior, PosteriorPoint
+
+MAX_ITERATIONS = 50
+# Newton decrement (nats) below which a frame counts as solved; the energy is a log-probability.
+DECREMENT = 1e-9
+# Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
+ROUNDING = 1e-7
+SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
+CHUNK = 256  # frames solved together; bounds the memory at about CHUNK * N * q doubles
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is known of the source at B frames, in normalised units.
+
+    Parameters
+    ----------
+    mean : array, shape (B, d_x)
+        b, finite everywhere.
+    variance : array, shape (B, d_x)
+        R, its variance; infinite where nothing is known.
+    """
+
+    mean: FloatArray
+    variance: FloatArray
+
+    @classmethod
+    def of(cls, X: FloatArray, sigma_c: float) -> Observation:
+        """Frames (B, d_x) with measurement noise sigma_c, Eq. (13); NaN: not observed."""
+        seen = ~np.isnan(X)
+        return cls(np.where(seen, X, 0.0), np.where(seen, sigma_c**2, np.inf))
+
+    def following(self, previous: FloatArray, sigma_t: float) -> Observation:
+        """With the pull of the previous cleaned frame, (B, d_x), added: Eq. (14)."""
+        precision = 1.0 / self.variance
+        total = precision + sigma_t**-2
+        mean = (precision * self.mean + sigma_t**-2 * previous) / total
+        return Observation(mean, 1.0 / total)
+
+    def __getitem__(self, rows: slice | FloatArray) -> Observation:
+        """Some of the frames."""
+        return Observation(self.mean[rows], self.variance[rows])
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Frames in latent space.
+
+    Parameters
+    ----------
+    z : array, shape (B, q)
+        z*, the latent positions.
+    x : array, shape (B, d_x)
+        x*, the most probable source.
+    hessian : array, shape (B, q, q)
+        ∇²F at z*; its inverse is the covariance of z in the Laplace approximation.
+    energy : array, shape (B,)
+        F(z*).
+    converged : array of bool, shape (B,)
+        Whether Newton's method met its tolerance.
+    """
+
+    z: FloatArray
+    x: FloatArray
+    hessian: FloatArray
+    energy: FloatArray
+    converged: np.typing.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Expansion:
+    """F and its derivatives at B latent positions."""
+
+    energy: FloatArray
+    gradient: FloatArray
+    hessian: FloatArray
+    x: FloatArray
+
+
+class SourceMapping:
+    """Maps observed frames to the latent space of a trained source view.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        The source view, X given Z.
+    """
+
+    def __init__(self, posterior: Posterior) -> None:
+        self.posterior = posterior
+        # F at every training latent is the search for a start: keep what does not change.
+        at = posterior.predict(posterior.Z)
+        self._train_mean = at.mean
+        self._train_variance = at.variance
+        self._train_energy = 0.5 * posterior.X.shape[1] * np.log(at.variance) + 0.5 * np.sum(
+            posterior.Z**2, axis=1
+        )
+
+    def start(self, observed: Observation) -> FloatArray:
+        """The training latent of least energy for each frame, (B, q).
+
+        σ_p² is taken as its mean over the training latents, where it varies little.
+        """
+        w = 1.0 / (self._train_variance.mean() + observed.variance)
+        mismatch = w @ (self._train_mean**2).T - 2.0 * (w * observed.mean) @ self._train_mean.T
+        best = (0.5 * mismatch + self._train_energy).argmin(axis=1)
+        return np.asarray(self.posterior.Z[best])
+
+    def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
+        """F(z) for B frames, (B,)."""
+        at = self.posterior.predict(z)
+        w = 1.0 / (at.variance[:, None] + observed.variance)
+        return _energy(z, at, w, at.mean - observed.mean)
+
+    def solve(self, observed: Observation, *starts: FloatArray) -> Mapped:
+        """Minimise F for each frame on its own, beginning at the best of the starts.
+
+        Parameters
+        ----------
+        observed : Observation
+            B frames.
+        *starts : array, shape (B, q)
+            Candidates beside the best training latent, e.g. the previous frame's z.
+
+        Returns
+        -------
+        Mapped
+            All frames; solved in chunks, so that memory stays bounded.
+        """
+        chunks = [
+            self._newton(observed[rows], [start[rows] for start in starts])
+            for rows in (
+                slice(first, first + CHUNK) for first in range(0, len(observed.mean), CHUNK)
+            )
+        ]
+        if len(chunks) == 1:
+            return chunks[0]
+        return Mapped(
+            *(
+                np.concatenate([getattr(chunk, name) for chunk in chunks])
+                for name in Mapped.__dataclass_fields__
+            )
+        )
+
+    def _newton(self, observed: Observation, starts: list[FloatArray]) -> Mapped:
+        """Newton's method; a shift appears only where a step is rejected, see `_step`."""
+        z = self._best_start(observed, starts)
+        at = self._expand(z, observed)
+        energy, gradient, hessian, x = at.energy, at.gradient, at.hessian, at.x
+        shift = np.zeros(len(z))
+        converged = np.zeros(len(z), dtype=bool)
+
+        active = np.arange(len(z))
+        for _ in range(MAX_ITERATIONS):
+            step = _step(hessian[active], gradient[active], shift[active])
+            descent = np.einsum("bq,bq->b", gradient[active], step)
+            done = np.abs(descent) < DECREMENT
+            converged[active[done]] = True
+            active, step, descent = active[~done], step[~done], descent[~done]
+            if not len(active):
+                break
+            at = self._expand(z[active] + step, observed[active])
+            better = (descent < 0.0) & (at.energy <= energy[active] + ROUNDING)
+            good, bad = active[better], active[~better]
+            z[good] += step[better]
+            energy[good], gradient[good] = at.energy[better], at.gradient[better]
+            hessian[good], x[good] = at.hessian[better], at.x[better]
+            shift[good] = np.where(shift[good] > SHIFT, 0.1 * shift[good], 0.0)
+            shift[bad] = np.maximum(10.0 * shift[bad], SHIFT)
+        return Mapped(z, x, hessian, energy, converged)
+
+    def _best_start(self, observed: Observation, starts: list[FloatArray]) -> FloatArray:
+        z = self.start(observed)
+        if not starts:
+            return z
+        candidates = np.stack([z, *starts])
+        energies = np.stack([self.energy(candidate, observed) for candidate in candidates])
+        return np.asarray(candidates[energies.argmin(axis=0), np.arange(len(z))])
+
+    def _expand(self, z: FloatArray, observed: Observation) -> _Expansion:
+        """F, ∇F, ∇²F and x* at z (B, q), by the formulas at the head of this file."""
+        posterior = self.posterior
+        theta2 = posterior.kernel.inverse_width
+        d_x = posterior.X.shape[1]
+        at = posterior.predict(z)
+        _, H, J = posterior.jacobians(at)
+
+        s = at.variance
+        w = 1.0 / (s[:, None] + observed.variance)
+        r = at.mean - observed.mean
+        wr = w * r
+        w2r = w * wr
+        a = -0.5 * np.einsum("bd,bd->b", wr, wr) + 0.5 * d_x / s
+        a_slope = np.einsum("bd,bd->b", w2r, wr) - 0.5 * d_x / s**2
+        g = -2.0 * np.einsum("bqn,bn->bq", H, at.whitened)
+        u = np.einsum("bqd,bd->bq", J, w2r)
+
+        gradient = np.einsum("bqd,bd->bq", J, wr) + a[:, None] * g + z
+
+        ek = (wr @ posterior.alpha.T - 2.0 * a[:, None] * posterior.solve(at)) * at.k
+        ug = u[:, :, None] * g[:, None, :]
+        hessian = (
+            (J * w[:, None, :]) @ J.transpose(0, 2, 1)
+            + a_slope[:, None, None] * g[:, :, None] * g[:, None, :]
+            - (ug + ug.transpose(0, 2, 1))
+            - (2.0 * a)[:, None, None] * (H @ H.transpose(0, 2, 1))
+            + theta2**2 * ((at.offsets * ek[:, :, None]).transpose(0, 2, 1) @ at.offsets)
+        )
+        diagonal = np.arange(z.shape[1])
+        hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
+        return _Expansion(_energy(z, at, w, r), gradient, hessian, at.mean - s[:, None] * wr)
+
+
+def _step(hessian: FloatArray, gradient: FloatArray, shift: FloatArray) -> FloatArray:
+    """Newton's step -H⁻¹ g, (B, q); with a shift, -(|H| + shift h)⁻¹ g.
+
+    |H| has the eigenvalues' absolute values, so that the shifted step descends from a saddle as
+    well; h is the largest of them.
+    """
+    step: FloatArray = np.negative(np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0])
+    shifted = np.flatnonzero(shift)
+    if len(shifted):
+        values, vectors = np.linalg.eigh(hessian[shifted])
+        values = np.abs(values)
+        values += shift[shifted, None] * values.max(axis=1, keepdims=True)
+        along = np.einsum("bqk,bq->bk", vectors, gradient[shifted]) / values
+        step[shifted] = -np.einsum("bqk,bk->bq", vectors, along)
+    return step
+
+
+def _energy(z: FloatArray, at: PosteriorPoint, w: FloatArray, r: FloatArray) -> FloatArray:
+    energy: FloatArray = 0.5 * (
+        np.einsum("bd,bd,bd->b", w, r, r)
+        + r.shape[1] * np.log(at.variance)
+        + np.einsum("bq,bq->b", z, z)
+    )
+    return energy

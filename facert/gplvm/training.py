@@ -1,0 +1,136 @@
+"""The training loop: advance, watch, checkpoint, until the objective no longer falls."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+from facert.errors import NumericalError
+from facert.gplvm.module import SharedGPLVM
+from facert.optim.base import Optimiser, Result, State, Status
+from facert.optim.flat import FlatObjective
+
+# The relative change is averaged over so many iterations: one short step is not convergence.
+WINDOW = 5
+
+
+@dataclass(frozen=True)
+class Progress:
+    """All that a stopped run needs to go on.
+
+    Parameters
+    ----------
+    state : State
+        Of the optimiser.
+    curve : tuple of float
+        The objective after each iteration so far.
+    """
+
+    state: State
+    curve: tuple[float, ...] = field(default=())
+
+    def converged(self, tolerance: float) -> bool:
+        """Whether the relative decrease an iteration fell below the tolerance."""
+        if len(self.curve) <= WINDOW:
+            return False
+        fall = self.curve[-1 - WINDOW] - self.curve[-1]
+        return fall <= WINDOW * tolerance * max(abs(self.curve[-1]), 1.0)
+
+
+class Monitor:
+    """What watches a training run; this one does nothing.
+
+    Subclasses draw a progress bar, write checkpoints, log the curve.
+    """
+
+    def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  a hook
+        """Where an earlier run with this fingerprint stopped, or None to begin anew."""
+        return None
+
+    def iteration(self, state: State) -> None:
+        """Called after every iteration."""
+
+    def checkpoint(self, progress: Progress) -> None:
+        """Called every so many iterations, and when the run is interrupted."""
+
+
+def train(
+    module: SharedGPLVM,
+    optimiser: Optimiser,
+    *,
+    tolerance: float,
+    max_iterations: int,
+    checkpoint_every: int,
+    fingerprint: str,
+    monitor: Monitor,
+) -> Result:
+    """Minimise the module's output; its parameters are then the best that were found.
+
+    Parameters
+    ----------
+    module : SharedGPLVM
+        Begins at its present parameters, or at the monitor's checkpoint.
+    optimiser : Optimiser
+        How to descend.
+    tolerance : float
+        Relative decrease an iteration below which the run has converged.
+    max_iterations : int
+        Counted over all resumed runs.
+    checkpoint_every : int
+        Iterations between two checkpoints.
+    fingerprint : str
+        Identifies the problem: its data and its settings.
+    monitor : Monitor
+        Watches, keeps checkpoints, knows where an earlier run stopped.
+
+    Returns
+    -------
+    Result
+        Ctrl-C does not raise: it ends the run with status ``"interrupted"``.
+    """
+    began = time.perf_counter()
+    objective = FlatObjective(module)
+    progress = monitor.resume(fingerprint) or Progress(optimiser.start(objective, objective.vector))
+
+    def watch(state: State) -> bool:
+        nonlocal progress
+        progress = Progress(state, (*progress.curve, state.value))
+        monitor.iteration(state)
+        return progress.converged(tolerance)
+
+    status: Status = "iteration limit"
+    try:
+        while progress.state.iterations < max_iterations:
+            left = max_iterations - progress.state.iterations
+            state = optimiser.advance(objective, progress.state, min(checkpoint_every, left), watch)
+            progress = replace(progress, state=state)
+            if progress.converged(tolerance):
+                status = "converged"
+                break
+            if state.stalled:
+                status = "stalled"
+                break
+            monitor.checkpoint(progress)
+    except KeyboardInterrupt:
+        status = "interrupted"
+        monitor.checkpoint(progress)
+    objective.vector = progress.state.x
+    if not progress.state.value < float("inf"):
+        raise NumericalError("training ended without a finite objective")
+    return Result(
+        value=progress.state.value,
+        gradient_norm=progress.state.gradient_norm,
+        iterations=progress.state.iterations,
+        evaluations=objective.evaluations,
+        seconds=time.perf_counter() - began,
+        status=status,
+        message=_MESSAGES[status],
+    )
+
+
+_MESSAGES: dict[Status, str] = {
+    "converged": "the objective no longer falls by the tolerance",
+    "iteration limit": "the iteration limit was reached before convergence",
+    "stalled": "no descent is possible within rounding",
+    "interrupted": "stopped by hand; the best state was kept",
+}

@@ -1,0 +1,74 @@
+"""Output files appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from facert.errors import InputError, OutputExistsError
+
+
+@contextmanager
+def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """Write under a temporary name in the same folder; rename when all went well.
+
+    Parameters
+    ----------
+    path : Path
+        The output file. Missing parent folders are made.
+    overwrite : bool
+        Allow to replace an existing file.
+
+    Yields
+    ------
+    Path
+        The temporary name, with the same ending; write, and close, the file there.
+
+    Raises
+    ------
+    OutputExistsError
+        When `path` exists and `overwrite` is not set; raised before anything is written.
+    InputError
+        When the file cannot be written there. On this, as on any exception of the writer, no
+        temporary file is left and an existing `path` is untouched.
+    """
+    path = Path(path)
+    if path.exists() and not overwrite:
+        raise OutputExistsError(path)
+    temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        _flush(temporary)
+        temporary.replace(path)
+        _flush(path.parent)
+    except OSError as error:
+        raise InputError(
+            "output",
+            "a file name in a folder that can be written to",
+            error.strerror or str(error),
+            "Choose another place, or make room there.",
+            where=str(path),
+        ) from error
+    finally:
+        _discard(temporary)
+
+
+def _flush(path: Path) -> None:
+    """Make the disk hold what was written; a folder too, so that a rename survives a power cut."""
+    if path.is_dir() and os.name == "nt":  # Windows cannot open a folder
+        return
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _discard(path: Path) -> None:
+    """Remove the temporary file if it is there; a parent that is no folder has none."""
+    if path.exists():
+        path.unlink()

@@ -1,0 +1,208 @@
+"""Live Link Face CSV, both ways.
+
+One row an observation: ``Timecode,BlendShapeCount``, then the 52 ARKit shapes and nine angles in
+radians. Columns are found by name: 51, 52 and 61 of them occur, in several spellings. A timecode
+is ``HH:MM:SS:FF.mmm``, with FF in 1/60 s whatever the rate of the rows; rows come with gaps, and a
+row whose count is 0 saw no face.
+"""
+
+from __future__ import annotations
+
+import csv
+import logging
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import BoolArray, FloatArray, IntArray, Source, Take
+from facert.errors import InputError, reading
+from facert.io.atomic import replacing
+from facert.io.rate import nominal_rate
+from facert.io.text import Row, check_width, read_csv, to_numbers
+from facert.names import ARKIT_NAMES, canonical, match, nearest
+
+log = logging.getLogger("facert")
+
+TICKS = 60_000
+"""Ticks a second: timecodes count thousandths of 1/60 s, and are kept as whole numbers."""
+
+_DAY = 24 * 3600 * TICKS
+_TIMECODE = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d):([0-5]\d(?:\.\d+)?)")
+_LEADING = ("Timecode", "BlendShapeCount")
+
+
+def is_livelink(header: Sequence[str]) -> bool:
+    """Tell by its header whether a CSV file is one of Live Link Face."""
+    return tuple(cell.lower() for cell in header[:2]) == tuple(name.lower() for name in _LEADING)
+
+
+def read_livelink(path: Path) -> Take:
+    """Read a Live Link Face CSV as a take whose source is weights, named as ARKit does.
+
+    Rows without a face, and rows that do not come after the one before, are dropped and counted
+    in the log.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line that is at fault.
+    """
+    with reading(path):
+        header, rows = read_csv(path)
+        if not is_livelink(header):
+            raise InputError(
+                "header", ",".join(_LEADING), ",".join(header[:2]), "Give a Live Link Face CSV."
+            )
+        rows = _rows_with_face(rows)
+        check_width(rows, header)
+        ticks = _unwrap_midnight(np.array([_row_ticks(row) for row in rows], dtype=np.int64))
+        kept = _rising(ticks)
+        values = to_numbers(rows, header, range(2, len(header)))[kept]
+        time = (ticks[kept] - ticks[0]) / TICKS
+        return Take(
+            time=time,
+            source=Source(values, _canonical_columns(header[2:])),
+            fps=nominal_rate(time),
+            start_timecode=rows[0].cells[0].strip(),
+        )
+
+
+def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
+    """Write the poses of a take, or else its source weights, as a Live Link Face CSV.
+
+    All 61 columns are written as the app does; names that the take does not have are 0. Frames
+    without a pose become rows without a face.
+
+    Raises
+    ------
+    InputError
+        When the controls or weights are not ARKit's, or only a part of a frame is known.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    columns = _arkit_columns(take)
+    known = np.asarray(~np.isnan(columns).all(axis=1))
+    if np.isnan(columns[known]).any():
+        raise InputError(
+            "/source/weights",
+            "frames that are known as a whole",
+            "frames that are known in part",
+            "Fill the gaps first (facert retarget does), or write a .csv table.",
+        )
+    start = parse_timecode(take.start_timecode or "00:00:00:00.000")
+    if start is None:
+        raise InputError(
+            "start_timecode", "HH:MM:SS:FF.mmm", take.start_timecode, "Correct the attribute."
+        )
+    ticks = start + np.rint(take.time * TICKS).astype(np.int64)
+    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
+        writer.writerows(_rows(ticks, columns, known))
+    if not known.all():
+        log.info("%d frames without a pose are rows without a face", np.sum(~known))
+
+
+def parse_timecode(text: str) -> int | None:
+    """Ticks since midnight of ``HH:MM:SS:FF.mmm``; None when it is no timecode."""
+    found = _TIMECODE.fullmatch(text.strip())
+    if found is None:
+        return None
+    hours, minutes, seconds = (int(part) for part in found.groups()[:3])
+    return ((hours * 60 + minutes) * 60 + seconds) * TICKS + round(float(found[4]) * 1000)
+
+
+def format_timecode(ticks: int) -> str:
+    """``HH:MM:SS:FF.mmm`` of ticks since a midnight."""
+    seconds, rest = divmod(ticks % _DAY, TICKS)
+    hours, minutes = divmod(seconds // 60, 60)
+    return f"{hours:02d}:{minutes:02d}:{seconds % 60:02d}:{rest // 1000:02d}.{rest % 1000:03d}"
+
+
+def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
+    kept = [row for row in rows if len(row.cells) > 1 and row.cells[1].strip() not in ("", "0")]
+    if len(kept) < len(rows):
+        log.info("dropped %d of %d rows without a face", len(rows) - len(kept), len(rows))
+    if not kept:
+        raise InputError(
+            "BlendShapeCount", "rows with a face", "none", "Record again with the face in view."
+        )
+    return kept
+
+
+def _row_ticks(row: Row) -> int:
+    ticks = parse_timecode(row.cells[0])
+    if ticks is None:
+        raise InputError(
+            f"line {row.line}, column Timecode",
+            "HH:MM:SS:FF.mmm",
+            repr(row.cells[0][:40]),
+            "Mend or remove the line.",
+        )
+    return ticks
+
+
+def _unwrap_midnight(ticks: IntArray) -> IntArray:
+    """Let time go on past midnight: a step back by more than half a day is a new day."""
+    new_days = np.diff(ticks, prepend=ticks[:1]) < -_DAY // 2
+    return ticks + _DAY * np.cumsum(new_days)
+
+
+def _rising(ticks: IntArray) -> IntArray:
+    """Indices of the rows that come after every row before them."""
+    latest_before = np.maximum.accumulate(ticks)[:-1]
+    kept = np.flatnonzero(np.append(True, ticks[1:] > latest_before))
+    if len(kept) < len(ticks):
+        log.warning("dropped %d rows whose time does not rise", len(ticks) - len(kept))
+    return kept
+
+
+def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:
+    """ARKit's spelling of the columns; a column that is not ARKit's stays, and is told about."""
+    names = tuple(canonical(column) for column in header)
+    for name in (name for name in names if name not in ARKIT_NAMES):
+        near = nearest(name, ARKIT_NAMES)
+        hint = f"; did you mean {near}?" if near else ""
+        log.warning("column %s is not one of Live Link Face%s", name, hint)
+    return names
+
+
+def _arkit_columns(take: Take) -> FloatArray:
+    """What to write, (T, 61): the poses, else the source weights, in the order of the CSV."""
+    if take.controls is not None and take.params is not None:
+        names, values, field = take.controls.names, take.params, "/target/names"
+    elif take.source.kind == "weights":
+        names, values, field = take.source.names, take.source.values, "/source/names"
+    else:
+        raise InputError(
+            "/target/params", "poses or source weights", "markers only", "Write a .csv or .h5 file."
+        )
+    foreign = [name for name in names if canonical(name) not in ARKIT_NAMES]
+    if foreign:
+        near = nearest(foreign[0], ARKIT_NAMES)
+        raise InputError(
+            field,
+            "ARKit shapes and angles",
+            f"{foreign[0]!r}" + (f" (nearest: {near!r})" if near else ""),
+            "Write a plain table, with a name that ends in .csv but not in .livelink.csv.",
+        )
+    columns = np.zeros((len(values), len(ARKIT_NAMES)))
+    columns[np.isnan(values).all(axis=1)] = np.nan
+    columns[:, match(names, ARKIT_NAMES, field)] = values
+    if len(names) < len(ARKIT_NAMES):
+        log.info("%d columns that the take has not are 0", len(ARKIT_NAMES) - len(names))
+    return columns
+
+
+def _rows(ticks: IntArray, columns: FloatArray, known: BoolArray) -> list[list[str]]:
+    """The cells of the file, one list a frame."""
+    template = ",".join(["%.10f"] * columns.shape[1])
+    count = str(columns.shape[1])
+    return [
+        [format_timecode(tick), count, *(template % tuple(row)).split(",")]
+        if face
+        else [format_timecode(tick), "0"]
+        for tick, row, face in zip(ticks.tolist(), columns.tolist(), known, strict=True)
+    ]

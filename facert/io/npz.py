@@ -1,0 +1,233 @@
+"""A generic .npz layout for tracks and rigs.
+
+Tracks: ``markers`` (T, M, 3) with ``marker_names``, or ``positions`` (T, M, 3) with ``names``, or
+``weights`` (T, D) with ``weight_names``; ``fps``;
+``time`` (T,) in seconds unless the frames are evenly spaced; any number of targets: ``KEY`` (T, P)
+with ``KEY_names`` (a plural KEY loses its s: ``units``, ``unit_names``).
+
+Rigs: ``neutral`` (V, 3), ``faces`` (F, 3), and shapes: ``deltas`` (P, V, 3) with ``names``, or any
+number of ``KEY_deltas`` with ``KEY_names``.
+
+Arrays are read one by one, after the size that they declare has been compared with what the
+archive holds; nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy_format
+from numpy.typing import NDArray
+
+from facert.data import Controls, FloatArray, IntArray, Rig, Source, Take
+from facert.errors import InputError, reading
+from facert.io.rate import nominal_rate
+from facert.io.text import existing_file
+
+MAX_BYTES = 2**30
+"""Largest array that is unpacked: one gibibyte."""
+
+_SOURCES = {"markers": "marker_names", "positions": "names", "weights": "weight_names"}
+_PLAIN = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_DAMAGED = (OSError, ValueError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile)
+
+
+class Archive:
+    """Reading access to the arrays of one open .npz file."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self.keys = tuple(
+            name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")
+        )
+
+    def __contains__(self, key: str) -> bool:
+        """Tell whether there is an array of that name."""
+        return key in self.keys
+
+    def numbers(self, key: str) -> FloatArray:
+        """Read an array of integers or floats as float64."""
+        return self._read(key, "iuf", "numbers").astype(np.float64)
+
+    def integers(self, key: str) -> IntArray:
+        """Read an array of integers as int64."""
+        return self._read(key, "iu", "integers").astype(np.int64)
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Read an array of strings."""
+        return tuple(str(name) for name in self._read(key, "U", "strings").ravel())
+
+    def number(self, key: str) -> float:
+        """Read an array that holds one number."""
+        values = self.numbers(key)
+        if values.size != 1:
+            raise InputError(key, "one number", f"shape {values.shape}", "Store a scalar.")
+        return float(values.ravel()[0])
+
+    def _read(self, key: str, kinds: str, expected: str) -> NDArray[Any]:
+        if key not in self:
+            raise InputError(key, "an array", "nothing", f"Store {key}; see the layout.")
+        member = self._archive.getinfo(f"{key}.npy")
+        if member.file_size > MAX_BYTES or member.compress_type not in _PLAIN:
+            found = f"{member.file_size} bytes, compression {member.compress_type}"
+            raise InputError(key, f"at most {MAX_BYTES} bytes, deflated", found, "Store it anew.")
+        try:
+            with self._archive.open(member) as stream:
+                dtype = _declared_type(stream, member.file_size)
+            if dtype.kind not in kinds:
+                raise InputError(key, expected, f"{dtype}", "Store plain numbers or strings.")
+            with self._archive.open(member) as stream:
+                return np.asarray(npy_format.read_array(stream, allow_pickle=False))
+        except _DAMAGED as error:
+            found = "damaged data, or less than the array declares"
+            raise InputError(key, "a whole array", found, "Store it anew.") from error
+
+
+@contextmanager
+def open_archive(path: Path) -> Iterator[Archive]:
+    """Open a foreign .npz file; errors raised inside name the file.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or is no .npz archive.
+    """
+    with reading(path):
+        existing_file(path)
+        try:
+            file = zipfile.ZipFile(path)
+        except _DAMAGED as error:
+            raise InputError(
+                "file", "an .npz archive", "something else", "Store it anew."
+            ) from error
+        with file:
+            yield Archive(file)
+
+
+def holds_rig(path: Path) -> bool:
+    """Tell a rig (it has a neutral and faces) from a track."""
+    with open_archive(path) as archive:
+        return "neutral" in archive and "faces" in archive
+
+
+def read_npz_take(path: Path, target: str | None = None, fps: float | None = None) -> Take:
+    """Read a track.
+
+    Parameters
+    ----------
+    path : Path
+    target : str, optional
+        Which of several targets; one alone, or none, needs no telling.
+    fps : float, optional
+        Frames a second where the file does not say.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the key that is at fault; the targets there are.
+    """
+    with open_archive(path) as archive:
+        source = _read_source(archive)
+        time, rate = _clock(archive, len(source.values), fps)
+        key = _choose(_targets(archive), target, "--target")
+        params = None if key is None else archive.numbers(key)
+        controls = None if key is None else Controls(archive.names(_names_key(key, archive)))
+        return Take(time=time, source=source, controls=controls, params=params, fps=rate)
+
+
+def read_npz_rig(path: Path, shapes: str | None = None) -> Rig:
+    """Read a rig.
+
+    Parameters
+    ----------
+    path : Path
+    shapes : str, optional
+        Which of several sets of shapes: KEY of ``KEY_deltas``.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the key that is at fault; the sets of shapes there are.
+    """
+    with open_archive(path) as archive:
+        sets = [key.removesuffix("_deltas") for key in archive.keys if key.endswith("_deltas")]
+        prefix = _choose(sets, shapes, "--shapes")
+        deltas, names = ("deltas", "names") if prefix is None else _prefixed(prefix)
+        return Rig(
+            neutral=archive.numbers("neutral"),
+            shapes=archive.numbers(deltas),
+            names=archive.names(names),
+            faces=archive.integers("faces"),
+        )
+
+
+def _declared_type(stream: IO[bytes], held: int) -> np.dtype[Any]:
+    """Type of an array, after a look at whether the archive holds as much as it declares."""
+    version = npy_format.read_magic(stream)
+    read_header = {
+        (1, 0): npy_format.read_array_header_1_0,
+        (2, 0): npy_format.read_array_header_2_0,
+    }.get(version)
+    if read_header is None:
+        raise ValueError("unknown version")
+    shape, _, dtype = read_header(stream)
+    if math.prod(shape) * max(dtype.itemsize, 1) > held:
+        raise ValueError("declares more than there is")
+    return dtype
+
+
+def _prefixed(prefix: str) -> tuple[str, str]:
+    return f"{prefix}_deltas", f"{prefix}_names"
+
+
+def _read_source(archive: Archive) -> Source:
+    for key, names in _SOURCES.items():
+        if key in archive:
+            values = archive.numbers(key)
+            if values.ndim != (2 if key == "weights" else 3):
+                layout = "(T, D)" if key == "weights" else "(T, M, 3)"
+                raise InputError(key, layout, f"shape {values.shape}", "One row a frame.")
+            return Source(values, archive.names(names))
+    there = ", ".join(archive.keys[:8]) or "nothing"
+    raise InputError("keys", " or ".join(_SOURCES), there, "Store the source; see the layout.")
+
+
+def _targets(archive: Archive) -> list[str]:
+    """Keys that come with names of their own and are not the source."""
+    keys = (key for key in archive.keys if key not in _SOURCES)
+    return [key for key in keys if _names_key(key, archive) in archive]
+
+
+def _names_key(key: str, archive: Archive) -> str:
+    own = f"{key}_names"
+    return own if own in archive else f"{key.removesuffix('s')}_names"
+
+
+def _choose(present: list[str], asked: str | None, option: str) -> str | None:
+    """The key that was asked for, or the only one; None when there is none."""
+    if asked in present:
+        return asked
+    if asked is None and len(present) < 2:
+        return present[0] if present else None
+    found = "none" if asked is None else repr(asked)
+    there = ", ".join(present) or "nothing"
+    raise InputError(option, f"one of: {there}", found, f"Choose with {option}.")
+
+
+def _clock(archive: Archive, frames: int, fps: float | None) -> tuple[FloatArray, float]:
+    """Time of the frames, and the nominal rate."""
+    if "fps" in archive:
+        fps = archive.number("fps")
+    if "time" in archive:
+        time = archive.numbers("time")
+        return time, fps or nominal_rate(time)
+    if not fps:
+        raise InputError("fps", "the rate of the frames", "none", "Store fps, or give --fps.")
+    return np.arange(frames) / fps, fps

@@ -1,0 +1,115 @@
+"""A folder of Wavefront OBJ files as a rig: ``neutral.obj`` and one file a shape.
+
+All files hold the same vertices in the same order. Quads and polygons become triangle fans;
+texture coordinates, normals, groups and materials are left aside.
+"""
+
+from __future__ import annotations
+
+import logging
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, Rig
+from facert.errors import InputError, reading
+from facert.io.text import read_text
+
+log = logging.getLogger("facert")
+
+NEUTRAL = "neutral"
+
+
+def read_obj_folder(folder: Path) -> Rig:
+    """Read ``neutral.obj`` and the other OBJ files of a folder, named and sorted by file name.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line that is at fault, or two meshes that do not belong together.
+    """
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".obj")
+    neutral_file = next((path for path in files if path.stem.lower() == NEUTRAL), None)
+    shape_files = [path for path in files if path != neutral_file]
+    if neutral_file is None or not shape_files:
+        raise InputError(
+            "folder",
+            f"{NEUTRAL}.obj and one OBJ file a shape",
+            ", ".join(path.name for path in files[:4]) or "no OBJ files",
+            "Export the rest pose under that name, and every shape beside it.",
+            where=str(folder),
+        )
+    neutral, faces = read_obj(neutral_file)
+    shapes = [_read_shape(path, neutral, faces) - neutral for path in shape_files]
+    with reading(folder):
+        names = tuple(path.stem for path in shape_files)
+        return Rig(neutral=neutral, shapes=np.stack(shapes), names=names, faces=faces)
+
+
+def read_obj(path: Path) -> tuple[FloatArray, IntArray]:
+    """Read the vertices (V, 3) and the triangles (F, 3) of one OBJ file.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line that is at fault.
+    """
+    vertices: list[list[float]] = []
+    triangles: list[list[int]] = []
+    with reading(path):
+        for number, line in enumerate(read_text(path).splitlines(), start=1):
+            keyword, *fields = line.split() or ("",)
+            try:
+                if keyword == "v":
+                    vertices.append([float(field) for field in _first_three(fields)])
+                elif keyword == "f":
+                    triangles += _fan([_vertex(field, len(vertices)) for field in fields])
+            except ValueError:
+                raise InputError(
+                    f"line {number}",
+                    "v X Y Z or f A B C ...",
+                    repr(line[:60]),
+                    "Export the file again.",
+                ) from None
+        if not vertices:
+            raise InputError("file", "vertices", "none", "Export the mesh again.")
+    return np.array(vertices), np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def _read_shape(path: Path, neutral: FloatArray, faces: IntArray) -> FloatArray:
+    vertices, own_faces = read_obj(path)
+    if vertices.shape != neutral.shape:
+        raise InputError(
+            "vertices",
+            f"{len(neutral)} as in {NEUTRAL}.obj",
+            f"{len(vertices)}",
+            "Export all shapes from one mesh, and keep the vertex order.",
+            where=str(path),
+        )
+    if len(own_faces) and not np.array_equal(own_faces, faces):
+        log.warning("%s: other faces than the neutral; is the vertex order the same?", path.name)
+    return vertices
+
+
+def _first_three(fields: list[str]) -> list[str]:
+    """The coordinates; a weight or colours may follow."""
+    if len(fields) < 3:
+        raise ValueError("a vertex has three coordinates")
+    return fields[:3]
+
+
+def _vertex(corner: str, count: int) -> int:
+    """Index from 0 of a corner ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``; negative: backwards."""
+    index = int(corner.split("/", 1)[0])
+    position = index - 1 if index > 0 else count + index
+    if index == 0 or position < 0:
+        raise ValueError("no such vertex")
+    return position
+
+
+def _fan(corners: list[int]) -> list[list[int]]:
+    """Triangles of a polygon, all at its first corner."""
+    if len(corners) < 3:
+        raise ValueError("a face has three corners or more")
+    return [[corners[0], *pair] for pair in pairwise(corners[1:])]

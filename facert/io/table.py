@@ -1,0 +1,122 @@
+"""Plain CSV tables with a header.
+
+A column ``time`` (seconds) or ``frame`` (numbers at the rate that is given) comes with columns
+``NAME.x NAME.y NAME.z`` (or ``NAME_x`` ...) for markers, or one column a weight. A blank cell was
+not observed. Written are the poses of a take, or else its source.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, Source, Take
+from facert.errors import InputError, reading
+from facert.io.atomic import replacing
+from facert.io.rate import nominal_rate
+from facert.io.text import check_width, read_csv, to_numbers
+
+_COORDINATE = re.compile(r"(.+)[._]([xyz])", re.IGNORECASE)
+
+
+def read_table(path: Path, fps: float | None = None) -> Take:
+    """Read a table as a take whose source is markers or weights.
+
+    Parameters
+    ----------
+    path : Path
+    fps : float, optional
+        Frames a second; needed with a column ``frame``, else estimated from the times.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line or column that is at fault.
+    """
+    with reading(path):
+        header, rows = read_csv(path)
+        check_width(rows, header)
+        clock = _clock_column(header)
+        columns = [column for column in range(len(header)) if column != clock]
+        names, order = _source_columns([header[column] for column in columns])
+        time = to_numbers(rows, header, [clock])[:, 0]
+        if header[clock].lower() == "frame":
+            time = _seconds(time, fps)
+        values = to_numbers(rows, header, columns)[:, order]
+        source = Source(values if order.ndim == 1 else values.reshape(len(rows), -1, 3), names)
+        return Take(time=time, source=source, fps=fps or _rate(time))
+
+
+def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
+    """Write time and the poses of a take, or else its source, as a table.
+
+    Raises
+    ------
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    names, values = _columns(take)
+    body = io.StringIO()
+    np.savetxt(body, np.column_stack([take.time, values]), fmt="%.10g", delimiter=",")
+    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow(["time", *names])
+        file.write(body.getvalue().replace("nan", ""))
+
+
+def _clock_column(header: Sequence[str]) -> int:
+    lower = [name.lower() for name in header]
+    for name in ("time", "frame"):
+        if name in lower:
+            return lower.index(name)
+    raise InputError(
+        "header",
+        "a column time (seconds) or frame",
+        ", ".join(header[:4]),
+        "Add one; or name the columns as Live Link Face does.",
+    )
+
+
+def _seconds(frames: FloatArray, fps: float | None) -> FloatArray:
+    if fps is None:
+        raise InputError(
+            "column frame", "the rate of the frames", "none", "Give --fps, or a column time."
+        )
+    return frames / fps
+
+
+def _rate(time: FloatArray) -> float:
+    """The nominal rate where time rises; `Take` tells about the rest."""
+    return nominal_rate(time) if (np.diff(time) > 0).all() else 1.0
+
+
+def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:
+    """Names of the markers and their columns (M, 3); or names of the weights and theirs (D,)."""
+    found = [_COORDINATE.fullmatch(name) for name in header]
+    markers = list(dict.fromkeys(match[1] for match in found if match))
+    place = {(match[1], match[2].lower()): i for i, match in enumerate(found) if match}
+    whole = [name for name in markers if all((name, axis) in place for axis in "xyz")]
+    if not whole:
+        return tuple(header), np.arange(len(header))
+    if 3 * len(whole) != len(header):
+        in_markers = {place[name, axis] for name in whole for axis in "xyz"}
+        odd = next(name for i, name in enumerate(header) if i not in in_markers)
+        raise InputError(
+            f"column {odd}",
+            "markers only, each with x, y and z",
+            "another column",
+            "Remove it: a take's source is markers or weights, not both.",
+        )
+    return tuple(whole), np.array([[place[name, axis] for axis in "xyz"] for name in whole])
+
+
+def _columns(take: Take) -> tuple[list[str], FloatArray]:
+    if take.controls is not None and take.params is not None:
+        return list(take.controls.names), take.params
+    if take.source.kind == "weights":
+        return list(take.source.names), take.source.values
+    return [f"{name}.{axis}" for name in take.source.names for axis in "xyz"], take.source.matrix

@@ -1,0 +1,136 @@
+"""Take files: facert's own HDF5 layout for a performance.
+
+==================  =====================  =========================================================
+``/time``           (T,)                   seconds, rising
+``/source/markers`` (T, M, 3)              positions; or ``/source/weights`` (T, D)
+``/source/names``   (M,) or (D,)           UTF-8
+``/source/valid``   (T, M) or (T, D) bool  optional; False, like NaN: not observed
+``/target/params``  (T, P)                 optional; a row of NaN: this frame has no pose
+``/target/names``   (P,)                   UTF-8
+``/target/limits``  (P, 2)                 optional
+``/target/std``     (T, P)                 optional: predictive standard deviation of the params
+``/animation/params`` (n, P)               optional: poses without a source frame
+attributes                                 format, format_version, fps, units, created_by,
+                                           optional start_timecode, up_axis
+==================  =====================  =========================================================
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import Controls, FloatArray, Source, Take
+from facert.errors import InputError
+from facert.io.hdf5 import GuardedFile, NewFile, create, open_guarded
+
+FORMAT = "facert-take"
+VERSION = 1
+
+
+def read_take(path: Path) -> Take:
+    """Read a take file, written by facert or by any other program that keeps to the layout.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the HDF5 path that is at fault.
+    """
+    with open_guarded(path) as file:
+        file.require_format(FORMAT, VERSION)
+        return Take(
+            time=file.numbers("/time"),
+            source=_read_source(file),
+            controls=_read_controls(file),
+            params=_optional(file, "/target/params"),
+            std=_optional(file, "/target/std"),
+            animation=_optional(file, "/animation/params"),
+            fps=file.number_attribute("fps"),
+            units=file.text_attribute("units"),
+            start_timecode=file.text_attribute("start_timecode"),
+            up_axis=file.text_attribute("up_axis"),
+            created_by=file.text_attribute("created_by"),
+        )
+
+
+def write_take(take: Take, path: Path, overwrite: bool = False) -> None:
+    """Write a take file; the same take gives the same bytes.
+
+    Raises
+    ------
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    with create(path, FORMAT, VERSION, overwrite) as file:
+        file.attribute("fps", take.fps)
+        file.attribute("units", take.units)
+        file.attribute("start_timecode", take.start_timecode)
+        file.attribute("up_axis", take.up_axis)
+        file.array("/time", take.time)
+        _write_source(file, take.source)
+        _write_target(file, take)
+
+
+def _read_source(file: GuardedFile) -> Source:
+    kinds = [kind for kind in ("markers", "weights") if f"/source/{kind}" in file]
+    if len(kinds) != 1:
+        raise InputError(
+            "/source",
+            "either /source/markers or /source/weights",
+            " and ".join(kinds) or "none of them",
+            "Write one of the two.",
+        )
+    path, dimensions = (f"/source/{kinds[0]}", 3 if kinds[0] == "markers" else 2)
+    values = file.numbers(path)
+    if values.ndim != dimensions:
+        layout = "(T, M, 3)" if dimensions == 3 else "(T, D)"
+        raise InputError(path, layout, f"shape {values.shape}", "Write one row a frame.")
+    if "/source/valid" in file:
+        _apply_valid(values, file)
+    return Source(values, file.names("/source/names"))
+
+
+def _apply_valid(values: FloatArray, file: GuardedFile) -> None:
+    """Set to NaN what the file says was not observed."""
+    valid = file.flags("/source/valid")
+    if valid.shape != values.shape[:2]:
+        raise InputError(
+            "/source/valid",
+            f"shape {values.shape[:2]}",
+            f"{valid.shape}",
+            "Give one flag a frame and marker or weight.",
+        )
+    values[~valid] = np.nan
+
+
+def _read_controls(file: GuardedFile) -> Controls | None:
+    if "/target/names" not in file:
+        return None
+    return Controls(file.names("/target/names"), _optional(file, "/target/limits"))
+
+
+def _optional(file: GuardedFile, path: str) -> FloatArray | None:
+    return file.numbers(path) if path in file else None
+
+
+def _write_source(file: NewFile, source: Source) -> None:
+    file.array(f"/source/{source.kind}", source.values)
+    file.names("/source/names", source.names)
+    if not source.valid.all():
+        file.array("/source/valid", source.valid)
+
+
+def _write_target(file: NewFile, take: Take) -> None:
+    if take.controls is None:
+        return
+    file.names("/target/names", take.controls.names)
+    arrays = {
+        "/target/limits": take.controls.limits,
+        "/target/params": take.params,
+        "/target/std": take.std,
+        "/animation/params": take.animation,
+    }
+    for path, values in arrays.items():
+        if values is not None:
+            file.array(path, values)

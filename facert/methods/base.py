@@ -1,0 +1,109 @@
+"""The small interface of every retargeting method.
+
+A method works on normalised arrays, one row a frame or a pose, and knows nothing of takes or
+files: `facert.retargeter` stands between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.gplvm.training import Monitor
+from facert.optim.base import Result
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """Frames with their poses: X (l, d_x) and Y (l, d_y), complete."""
+
+    X: FloatArray
+    Y: FloatArray
+
+
+@dataclass(frozen=True)
+class Unlabelled:
+    """Frames without a pose, X (m, d_x), and poses without a frame, Y (n, d_y), complete."""
+
+    X: FloatArray
+    Y: FloatArray
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a method says about T frames, in normalised units.
+
+    Parameters
+    ----------
+    Y : array, shape (T, d_y)
+        Poses.
+    std : array, shape (T, d_y)
+        Their predictive standard deviation.
+    X : array, shape (T, d_x)
+        The cleaned source.
+    """
+
+    Y: FloatArray
+    std: FloatArray
+    X: FloatArray
+
+
+@dataclass(frozen=True)
+class Report:
+    """How training went, for people and for the model file.
+
+    Parameters
+    ----------
+    result : Result
+        Of the optimiser.
+    figures : mapping of str to float
+        What the method has to say of itself, e.g. kernel parameters.
+    """
+
+    result: Result
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+
+class Stream(Protocol):
+    """Maps one frame after the other, each with the memory of those before."""
+
+    def step(self, frame: FloatArray) -> Prediction:
+        """The prediction for one more frame, (1, d_x); NaN: not observed."""
+        ...
+
+
+class Method(Protocol):
+    """A way to learn the map from source to target."""
+
+    def fit(self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...) -> Report:
+        """Learn from labelled frames and whatever unlabelled data the method can use."""
+        ...
+
+    def predict(self, frames: FloatArray) -> Prediction:
+        """Map frames (T, d_x), each on its own; NaN: not observed."""
+        ...
+
+    def stream(self) -> Stream:
+        """Begin to map frames one after the other."""
+        ...
+
+    def save(self) -> dict[str, FloatArray]:
+        """What was learned, as named arrays."""
+        ...
+
+    def load(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Take over what `save` returned; raises InputError when shapes do not fit together."""
+        ...
+
+
+def stack_predictions(predictions: list[Prediction]) -> Prediction:
+    """One prediction of all frames from one a frame."""
+    return Prediction(
+        np.concatenate([p.Y for p in predictions]),
+        np.concatenate([p.std for p in predictions]),
+        np.concatenate([p.X for p in predictions]),
+    )

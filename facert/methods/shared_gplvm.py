@@ -1,0 +1,227 @@
+"""The shared GPLVM as a retargeting method: semi-supervised (the paper's) and supervised."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+
+from facert.data import FloatArray
+from facert.errors import DeviceError, InputError
+from facert.gp.kernel import Kernel
+from facert.gp.posterior import Posterior
+from facert.gplvm.alignment import align
+from facert.gplvm.lle import constraint_matrix
+from facert.gplvm.module import SharedGPLVM
+from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
+from facert.gplvm.target_mapping import map_to_target
+from facert.gplvm.training import Monitor, train
+from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
+from facert.optim.base import Optimiser
+from facert.optim.lbfgs import LBFGS
+from facert.optim.scg import SCG
+from facert.settings import OptimiserName, Settings
+from facert.threads import threads_for
+
+log = logging.getLogger(__name__)
+
+OPTIMISERS: dict[OptimiserName, type[LBFGS] | type[SCG]] = {"lbfgs": LBFGS, "scg": SCG}
+
+
+class SemiSupervisedSGPLVM:
+    """Bouaziz and Pauly (2014): labelled frames, the rest of the take, and old animation.
+
+    Parameters
+    ----------
+    settings : Settings
+        Latent dimension, neighbours, noise, optimiser, device.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+
+    def fit(
+        self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
+    ) -> Report:
+        """Train the model, Eq. (4), from the alignment of both views.
+
+        Parameters
+        ----------
+        labelled, unlabelled : Labelled, Unlabelled
+            Normalised and complete.
+        monitor : Monitor, optional
+            Watches the iterations and keeps checkpoints.
+        """
+        X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
+        count = len(labelled.X)
+        points = len(X) + len(Y) - count
+        with threads_for(points):
+            module = self._initial_module(X, Y, count)
+            result = train(
+                module.to(_device(self.settings.device)),
+                self._optimiser(),
+                tolerance=self.settings.tolerance,
+                max_iterations=self.settings.max_iterations,
+                checkpoint_every=self.settings.checkpoint_every,
+                fingerprint=_fingerprint(X, Y, self.settings),
+                monitor=monitor or Monitor(),
+            )
+            self._set_views(
+                Posterior(module.latents_x, X, module.kernel_x),
+                Posterior(module.latents_y, Y, module.kernel_y),
+            )
+        return Report(result, self._figures(labelled))
+
+    def predict(self, frames: FloatArray) -> Prediction:
+        """Map frames (T, d_x), each on its own; NaN: not observed."""
+        with threads_for(len(self.source_.Z)):
+            observed = Observation.of(frames, self.settings.sigma_c)
+            return self._to_target(self.mapping_.solve(observed))
+
+    def stream(self) -> Stream:
+        """Begin to map frames one after the other, with the temporal term of Eq. (14)."""
+        return _SharedStream(self)
+
+    def save(self) -> dict[str, FloatArray]:
+        """Both trained views: latent coordinates, observations, kernel parameters."""
+        arrays: dict[str, FloatArray] = {}
+        for view, posterior in (("source", self.source_), ("target", self.target_)):
+            kernel = posterior.kernel
+            arrays[f"{view}.latents"] = posterior.Z
+            arrays[f"{view}.observations"] = posterior.X
+            arrays[f"{view}.kernel"] = np.array(
+                [kernel.variance, kernel.inverse_width, kernel.noise]
+            )
+        return arrays
+
+    def load(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Take over what `save` returned.
+
+        Raises
+        ------
+        InputError
+            When an array is absent or the shapes do not fit together.
+        """
+        views = [_view(arrays, name) for name in ("source", "target")]
+        if views[0].Z.shape[1] != views[1].Z.shape[1]:
+            dimensions = [view.Z.shape[1] for view in views]
+            raise InputError(
+                "target.latents", f"{dimensions[0]} dimensions", f"{dimensions[1]}", _DAMAGED
+            )
+        self._set_views(*views)
+
+    def _set_views(self, source: Posterior, target: Posterior) -> None:
+        self.source_, self.target_ = source, target
+        self.mapping_ = SourceMapping(source)
+
+    def _to_target(self, mapped: Mapped) -> Prediction:
+        if not mapped.converged.all():
+            log.warning("%d frames did not converge", int((~mapped.converged).sum()))
+        mean, std = map_to_target(self.target_, mapped)
+        return Prediction(mean, std, mapped.x)
+
+    def _initial_module(self, X: FloatArray, Y: FloatArray, labelled: int) -> SharedGPLVM:
+        M = constraint_matrix(X, Y, labelled, self.settings.neighbours)
+        latent_dim = min(self.settings.latent_dim, M.shape[1] - 1)
+        if latent_dim < self.settings.latent_dim:
+            log.warning("%d points carry only %d latent dimensions", M.shape[1], latent_dim)
+        floors = self.settings.noise_floors
+        return SharedGPLVM(X, Y, labelled, M, align(M, latent_dim), *floors)
+
+    def _optimiser(self) -> Optimiser:
+        return OPTIMISERS[self.settings.optimizer]()
+
+    def _figures(self, labelled: Labelled) -> dict[str, float]:
+        figures: dict[str, float] = {}
+        for view, posterior in (("source", self.source_), ("target", self.target_)):
+            for index, value in enumerate(posterior.kernel.theta, start=1):
+                figures[f"{view} theta{index}"] = value
+        residual = self.predict(labelled.X).Y - labelled.Y
+        figures["training reconstruction"] = float(np.sqrt(np.mean(residual**2)))
+        return figures
+
+
+class SupervisedSGPLVM(SemiSupervisedSGPLVM):
+    """Ek (2009): the labelled frames alone."""
+
+    def fit(
+        self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
+    ) -> Report:
+        """Train on the labelled frames; the unlabelled data is not used."""
+        nothing = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
+        return super().fit(labelled, nothing, monitor)
+
+
+class _SharedStream:
+    def __init__(self, method: SemiSupervisedSGPLVM) -> None:
+        self.method = method
+        self.previous: Mapped | None = None
+
+    def step(self, frame: FloatArray) -> Prediction:
+        """Map one more frame (1, d_x)."""
+        settings = self.method.settings
+        observed = Observation.of(frame, settings.sigma_c)
+        starts = []
+        if self.previous is not None:
+            observed = observed.following(self.previous.x, settings.sigma_t)
+            starts.append(self.previous.z)
+        self.previous = self.method.mapping_.solve(observed, *starts)
+        return self.method._to_target(self.previous)
+
+
+def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
+    """What a checkpoint must agree with; rounded, so that another machine agrees as well."""
+    digest = hashlib.sha256()
+    for array in (X, Y):
+        digest.update(np.round(array, 6).tobytes())
+    shaping = (
+        settings.method,
+        settings.latent_dim,
+        settings.neighbours,
+        settings.noise_floors,
+        settings.optimizer,
+        X.shape,
+        Y.shape,
+    )
+    digest.update(repr(shaping).encode())
+    return digest.hexdigest()
+
+
+def _device(name: str) -> torch.device:
+    """The device of that name.
+
+    Raises
+    ------
+    DeviceError
+        When it is not there: training never falls back to another device in silence.
+    """
+    try:
+        device = torch.device(name)
+        torch.empty(0, device=device)
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        reason = str(error).splitlines()[0]
+        raise DeviceError(f"--device {name}: {reason}. Use --device cpu.") from None
+    return device
+
+
+def _view(arrays: Mapping[str, FloatArray], name: str) -> Posterior:
+    def array(part: str, ndim: int) -> FloatArray:
+        key = f"{name}.{part}"
+        value = arrays.get(key)
+        if value is None or value.ndim != ndim or not value.size:
+            found = "nothing" if value is None else f"shape {value.shape}"
+            raise InputError(key, f"an array of {ndim} dimensions", found, _DAMAGED)
+        return value
+
+    Z, X, theta = array("latents", 2), array("observations", 2), array("kernel", 1)
+    if len(Z) != len(X):
+        raise InputError(f"{name}.latents", f"{len(X)} rows", f"{len(Z)}", _DAMAGED)
+    if theta.shape != (3,) or not (theta > 0).all():
+        raise InputError(f"{name}.kernel", "three positive numbers", f"{theta}", _DAMAGED)
+    return Posterior(Z, X, Kernel(*theta.tolist()))
+
+
+_DAMAGED = "The model file is damaged: train it again."

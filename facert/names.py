@@ -1,0 +1,176 @@
+"""Names of shapes and controls: their spellings, the standard list, groups of the face.
+
+Programs spell one shape in many ways: ``EyeBlinkLeft`` (Live Link CSV), ``eyeBlinkLeft`` (ARKit),
+``eyeBlink_L`` (ICT-FaceKit, Face Cap). Names are matched by their words, whatever the case,
+the separators and the way to write the side.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from facert.data import IntArray
+from facert.errors import InputError
+
+_SHAPES = """
+    eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft
+    eyeWideLeft eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight
+    eyeSquintRight eyeWideRight jawForward jawRight jawLeft jawOpen mouthClose mouthFunnel
+    mouthPucker mouthRight mouthLeft mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight
+    mouthDimpleLeft mouthDimpleRight mouthStretchLeft mouthStretchRight mouthRollLower
+    mouthRollUpper mouthShrugLower mouthShrugUpper mouthPressLeft mouthPressRight
+    mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight browDownLeft
+    browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
+    cheekSquintRight noseSneerLeft noseSneerRight tongueOut
+"""
+_ANGLES = """
+    headYaw headPitch headRoll leftEyeYaw leftEyePitch leftEyeRoll rightEyeYaw rightEyePitch
+    rightEyeRoll
+"""
+
+ARKIT_SHAPES = tuple(_SHAPES.split())
+"""The 52 shapes in the order of the Live Link Face CSV."""
+
+ARKIT_ANGLES = tuple(_ANGLES.split())
+"""The nine angles that follow them, in radians."""
+
+ARKIT_NAMES = ARKIT_SHAPES + ARKIT_ANGLES
+
+_SIDES = {"l": "left", "r": "right"}
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
+
+# The first word of a name that begins like one of these tells the group.
+_GROUP_STEMS = {
+    "brows": ("brow", "eyebrow", "forehead"),
+    "eyes": ("eye", "lid", "gaze", "blink", "pupil"),
+    "nose": ("nose", "nostril"),
+    "cheeks": ("cheek",),
+    "mouth": ("mouth", "lip", "tongue", "teeth", "smile"),
+    "jaw": ("jaw", "chin"),
+    "head": ("head", "neck"),
+}
+OTHER = "other"
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of a name in lower case, with ``l`` and ``r`` written out."""
+    found = (word.lower() for word in _WORD.findall(name))
+    return tuple(_SIDES.get(word, word) for word in found)
+
+
+def folded(name: str) -> str:
+    """What all spellings of a name have in common: its words without anything between them.
+
+    >>> folded("EyeBlink_L"), folded("eye-blink-left")
+    ('eyeblinkleft', 'eyeblinkleft')
+    """
+    return "".join(words(name)) or name
+
+
+_ARKIT_SPELLING = {folded(name): name for name in ARKIT_NAMES}
+
+
+def canonical(name: str) -> str:
+    """ARKit's own spelling of an ARKit shape or angle; any other name as it is.
+
+    >>> canonical("EyeBlink_L"), canonical("mouth-open")
+    ('eyeBlinkLeft', 'mouth-open')
+    """
+    return _ARKIT_SPELLING.get(folded(name), name)
+
+
+def nearest(name: str, candidates: Sequence[str]) -> str | None:
+    """The candidate that is spelled most like `name`, or None when none comes near."""
+    spelled = {folded(candidate): candidate for candidate in candidates}
+    found = difflib.get_close_matches(folded(name), spelled, n=1, cutoff=0.7)
+    return spelled[found[0]] if found else None
+
+
+class NameIndex:
+    """Where names stand in a list, whatever their spelling.
+
+    A name is found as it is spelled, or else by the one other spelling of it in the list.
+
+    Parameters
+    ----------
+    names : sequence of str
+        All different.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        spellings = [folded(name) for name in names]
+        count = Counter(spellings)
+        self._folded = {key: i for i, key in enumerate(spellings) if count[key] == 1}
+        self._exact = {name: i for i, name in enumerate(names)}
+
+    def find(self, name: str) -> int | None:
+        """The position of `name`, or None."""
+        return self._exact.get(name, self._folded.get(folded(name)))
+
+
+def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
+    """Where each wanted name stands among others, in any spelling.
+
+    Parameters
+    ----------
+    wanted : sequence of str, length P
+    among : sequence of str, length D
+    field : str
+        What holds `among`, for the message, e.g. ``"/source/names"``.
+
+    Returns
+    -------
+    array of int, shape (P,)
+        Indices into `among`.
+
+    Raises
+    ------
+    InputError
+        For the first name that is not there, with the nearest one that is.
+    """
+    index = NameIndex(among)
+    positions = [index.find(name) for name in wanted]
+    if None in positions:
+        lost = wanted[positions.index(None)]
+        near = nearest(lost, among)
+        hint = f"nearest: {near!r}" if near else f"{len(among)} other names"
+        more = positions.count(None) - 1
+        also = f" (and {more} more)" if more else ""
+        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it, or map the names.")
+    return np.array(positions, dtype=np.int64)
+
+
+def control_groups(names: Sequence[str]) -> dict[str, IntArray]:
+    """Sort controls into the parts of the face by the words of their names.
+
+    Parameters
+    ----------
+    names : sequence of str, length P
+        ARKit, ICT-FaceKit, MakeHuman or similar names.
+
+    Returns
+    -------
+    dict
+        From the group (brows, eyes, nose, cheeks, mouth, jaw, head, other; in this order, empty
+        ones left out) to the indices of its controls. Each control is in one group.
+    """
+    groups = [_group(name) for name in names]
+    present = Counter(groups)
+    return {
+        group: np.array([i for i, found in enumerate(groups) if found == group], dtype=np.int64)
+        for group in (*_GROUP_STEMS, OTHER)
+        if present[group]
+    }
+
+
+def _group(name: str) -> str:
+    for word in words(name):
+        for group, stems in _GROUP_STEMS.items():
+            if word.startswith(stems):
+                return group
+    return OTHER

@@ -1,0 +1,62 @@
+"""Normalised units: centred, and divided by the largest standard deviation of a dimension.
+
+The paper centres both observation spaces and rescales them by their maximum variance; dividing by
+its root makes the largest variance 1, whatever the unit of length. Dimensions keep their relative
+size: a marker that hardly moves stays small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.errors import InputError
+
+# Less motion than this, relative to the largest coordinate, is rounding.
+STILL = 1e-9
+
+
+@dataclass(frozen=True)
+class Normalisation:
+    """An affine map to normalised units.
+
+    Parameters
+    ----------
+    mean : array, shape (d,)
+        Of each dimension, in the data's units.
+    scale : float
+        The largest standard deviation of a dimension, in the data's units.
+    """
+
+    mean: FloatArray
+    scale: float
+
+    @classmethod
+    def of(cls, values: FloatArray, field: str) -> Normalisation:
+        """From rows (n, d); NaN is passed over.
+
+        Raises
+        ------
+        InputError
+            When nothing varies.
+        """
+        mean = np.nanmean(values, axis=0)
+        scale = float(np.nanstd(values, axis=0).max())
+        if not scale > STILL * max(float(np.nanmax(np.abs(values))), 1e-300):
+            raise InputError(
+                field,
+                "values that change over the rows",
+                "the same row throughout",
+                "Check that the right data was exported.",
+            )
+        return cls(mean, scale)
+
+    def apply(self, values: FloatArray) -> FloatArray:
+        """To normalised units, (n, d)."""
+        return (values - self.mean) / self.scale
+
+    def undo(self, values: FloatArray) -> FloatArray:
+        """Back to the data's units, (n, d)."""
+        return values * self.scale + self.mean

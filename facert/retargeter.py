@@ -1,0 +1,286 @@
+"""From a take to a trained retargeter, and from a take and a retargeter to a performance.
+
+This is the one path of the data: take, normalised arrays, method, take. Nothing else normalises,
+and nothing else undoes it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+import facert
+from facert.data import Controls, FloatArray, Source, SourceKind, Take
+from facert.errors import InputError, reading
+from facert.gplvm.training import Monitor
+from facert.io.tensors import read_tensors, write_tensors
+from facert.methods import Method, make_method
+from facert.methods.base import Labelled, Report, Unlabelled, stack_predictions
+from facert.names import match
+from facert.normalisation import Normalisation
+from facert.settings import Settings
+from facert.threads import threads_for
+from facert.training_set import choose_training_set
+
+log = logging.getLogger(__name__)
+
+FORMAT = "facert-model"
+Mode = Literal["offline", "online"]
+
+
+@dataclass(frozen=True)
+class Retargeter:
+    """A trained method with all that mapping a take needs.
+
+    Made by `train` or `load`.
+
+    Parameters
+    ----------
+    method : Method
+        Works in normalised units.
+    settings : Settings
+        It was trained with these.
+    source_kind, source_names : str, tuple of str
+        What the source must hold.
+    controls : Controls
+        What the result holds; their limits clip it.
+    source_units, target_units : Normalisation
+        To normalised units and back.
+    figures : dict
+        How training went, for people.
+    """
+
+    method: Method
+    settings: Settings
+    source_kind: SourceKind
+    source_names: tuple[str, ...]
+    controls: Controls
+    source_units: Normalisation
+    target_units: Normalisation
+    figures: dict[str, Any]
+
+    def retarget(self, take: Take, mode: Mode = "offline") -> Take:
+        """The take with a pose and its standard deviation in every frame, and a cleaned source.
+
+        Parameters
+        ----------
+        take : Take
+            Its source must hold this retargeter's markers or weights, in any order; NaN is
+            mapped as not observed.
+        mode : {"offline", "online"}
+            All frames at once, each on its own; or one after the other with the temporal term,
+            as a live stream would be.
+
+        Raises
+        ------
+        InputError
+            When the source is of another kind or lacks names that the model needs.
+        """
+        source = self._matched(take.source)
+        frames = self.source_units.apply(source.matrix)
+        if mode == "online":
+            stream = self.method.stream()
+            with threads_for(1):
+                steps = [stream.step(frames[row : row + 1]) for row in range(len(frames))]
+            prediction = stack_predictions(steps)
+        else:
+            prediction = self.method.predict(frames)
+        params = self.target_units.undo(prediction.Y)
+        if self.controls.limits is not None:
+            params = np.clip(params, *self.controls.limits.T)
+        return replace(
+            take,
+            source=source.with_matrix(self.source_units.undo(prediction.X)),
+            controls=self.controls,
+            params=params,
+            std=prediction.std * self.target_units.scale,
+            animation=None,
+        )
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the model holds and how it was made, as plain values."""
+        return {
+            "source_kind": self.source_kind,
+            "source_names": list(self.source_names),
+            "target_names": list(self.controls.names),
+            "settings": self.settings.as_dict(),
+            "figures": self.figures,
+        }
+
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write everything to one safetensors file.
+
+        Raises
+        ------
+        OutputExistsError
+            When the file exists and `overwrite` is false.
+        """
+        arrays = {f"method.{name}": array for name, array in self.method.save().items()}
+        for view, units in (("source", self.source_units), ("target", self.target_units)):
+            arrays[f"{view}.mean"] = units.mean
+            arrays[f"{view}.scale"] = np.array([units.scale])
+        if self.controls.limits is not None:
+            arrays["target.limits"] = self.controls.limits
+        metadata = {
+            "format": FORMAT,
+            "format_version": 1,
+            "created_by": f"facert {facert.__version__}",
+            "versions": library_versions(),
+            **self.facts,
+        }
+        write_tensors(Path(path), arrays, metadata, overwrite)
+
+    def _matched(self, source: Source) -> Source:
+        """The source's columns in the order the model knows them."""
+        if source.kind != self.source_kind:
+            raise InputError(
+                "/source",
+                self.source_kind,
+                source.kind,
+                "Give a take of the kind it was trained on.",
+            )
+        columns = match(self.source_names, source.names, "/source/names")
+        extra = len(source.names) - len(columns)
+        if extra:
+            log.info("%d names of the source are not in the model: passed over", extra)
+        return Source(source.values[:, columns], self.source_names)
+
+
+def train(
+    take: Take, settings: Settings | None = None, monitor: Monitor | None = None
+) -> Retargeter:
+    """Learn to retarget from a take's labels, its other frames, and its animation.
+
+    Parameters
+    ----------
+    take : Take
+        With poses in some frames.
+    settings : Settings, optional
+        By default the semi-supervised shared GPLVM with the paper's dimensions.
+    monitor : Monitor, optional
+        Watches the training; see `facert.gplvm.training`.
+
+    Raises
+    ------
+    InputError
+        When the take has too few labels, or source or poses that never change.
+    """
+    settings = settings or Settings()
+    controls = take.controls
+    if controls is None:
+        raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
+    take = replace(take, source=_observed_part(take.source))
+    data = choose_training_set(take, settings)
+    source_units = Normalisation.of(take.source.matrix, f"/source/{take.source.kind}")
+    target_units = Normalisation.of(
+        np.vstack([data.Y_labelled, data.Y_unlabelled]), "/target/params"
+    )
+    labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
+    unlabelled = Unlabelled(
+        source_units.apply(data.X_unlabelled), target_units.apply(data.Y_unlabelled)
+    )
+    method = make_method(settings)
+    report = method.fit(labelled, unlabelled, monitor or Monitor())
+    return Retargeter(
+        method=method,
+        settings=settings,
+        source_kind=take.source.kind,
+        source_names=take.source.names,
+        controls=controls,
+        source_units=source_units,
+        target_units=target_units,
+        figures=_figures(report, labelled, unlabelled),
+    )
+
+
+def load(path: str | Path) -> Retargeter:
+    """Read a retargeter from a model file.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged, not a model, or does not fit together.
+    """
+    arrays, metadata = read_tensors(Path(path), FORMAT)
+    with reading(path):
+        try:
+            settings = Settings().with_changes(metadata["settings"])
+            kind, names = metadata["source_kind"], tuple(metadata["source_names"])
+            controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
+            source_units, target_units = (
+                Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
+                for view in ("source", "target")
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(
+                "the metadata", "a complete model", f"{error!r}", "Train the model again."
+            ) from None
+        method = make_method(settings)
+        method.load(
+            {n.removeprefix("method."): a for n, a in arrays.items() if n.startswith("method.")}
+        )
+        retargeter = Retargeter(
+            method,
+            settings,
+            kind,
+            names,
+            controls,
+            source_units,
+            target_units,
+            metadata.get("figures", {}),
+        )
+        _check_fit(retargeter, arrays)
+    return retargeter
+
+
+def _observed_part(source: Source) -> Source:
+    """The source without markers or weights that no frame shows: nothing can be learned of them."""
+    seen = np.asarray(source.valid.any(axis=0))
+    if seen.all():
+        return source
+    silent = [name for name, there in zip(source.names, seen, strict=True) if not there]
+    log.warning("never observed in the take, left out: %s", ", ".join(silent))
+    names = tuple(name for name, there in zip(source.names, seen, strict=True) if there)
+    return Source(source.values[:, seen], names)
+
+
+def _figures(report: Report, labelled: Labelled, unlabelled: Unlabelled) -> dict[str, Any]:
+    result = report.result
+    return {
+        "labelled frames": len(labelled.X),
+        "unlabelled frames": len(unlabelled.X),
+        "unlabelled poses": len(unlabelled.Y),
+        "objective": result.value,
+        "gradient norm": result.gradient_norm,
+        "iterations": result.iterations,
+        "seconds": result.seconds,
+        "status": result.status,
+        **report.figures,
+    }
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of what computed a result, for its metadata."""
+    return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
+
+
+def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None:
+    """Refuse a file whose parts disagree in size: mapping would fail, or worse, not fail."""
+    width = 3 if retargeter.source_kind == "markers" else 1
+    dimensions = {
+        "source": len(retargeter.source_names) * width,
+        "target": len(retargeter.controls.names),
+    }
+    for view, count in dimensions.items():
+        for name in (f"{view}.mean", f"method.{view}.observations"):
+            if arrays[name].shape[-1] != count:
+                raise InputError(
+                    name, f"{count} columns", f"{arrays[name].shape}", "Train the model again."
+                )

@@ -1,0 +1,152 @@
+"""Everything about a training run that a person may change, in one place."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal, get_args, get_type_hints
+
+from facert.errors import InputError
+
+OptimiserName = Literal["lbfgs", "scg"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to train and how to map.
+
+    Lengths and noise are in normalised units: the source (and likewise the target) is centred and
+    divided by the largest standard deviation of one of its dimensions.
+
+    Parameters
+    ----------
+    method : str
+        Name in the registry of methods.
+    labels : int, optional
+        Use only so many of the posed frames, drawn at random; by default all of them.
+    unlabelled : int
+        Frames without a pose and poses without a frame used in training, at most so many of each.
+    seed : int
+        For every random choice.
+    latent_dim : int
+        q, dimensions of the latent space.
+    neighbours : int
+        k of the reconstruction constraints, Eq. (7).
+    sigma_c : float
+        Standard deviation of the measurement noise of the source, Eq. (13). It also sets the
+        noise floor of the source view.
+    sigma_t : float
+        Standard deviation of the change from one cleaned frame to the next, Eq. (14); used when
+        frames are mapped one after the other.
+    source_noise_floor : float, optional
+        Least noise variance 1/θ3 of the source view; by default sigma_c².
+    target_noise_floor : float
+        The same for the target view: how far, squared, a posed control may be off.
+    optimizer : {"lbfgs", "scg"}
+        L-BFGS-B, or the paper's scaled conjugate gradients.
+    tolerance : float
+        Training ends when the objective falls by less than this, relative, an iteration.
+    max_iterations : int
+        Iterations at most.
+    checkpoint_every : int
+        Iterations between two checkpoints.
+    device : str
+        Where training runs: ``"cpu"`` or a torch CUDA device.
+    """
+
+    method: str = "ssgplvm"
+    labels: int | None = None
+    unlabelled: int = 100
+    seed: int = 0
+    latent_dim: int = 8
+    neighbours: int = 8
+    sigma_c: float = 0.1
+    sigma_t: float = 0.3
+    source_noise_floor: float | None = None
+    target_noise_floor: float = 5e-2
+    optimizer: OptimiserName = "lbfgs"
+    tolerance: float = 1e-6
+    max_iterations: int = 2000
+    checkpoint_every: int = 100
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        hints = get_type_hints(Settings)
+        for field in fields(self):
+            _check_type(field.name, getattr(self, field.name), hints[field.name])
+        for name in ("latent_dim", "neighbours", "max_iterations", "checkpoint_every"):
+            self._at_least(name, 1)
+        for name in ("unlabelled", "seed", "target_noise_floor", "tolerance"):
+            self._at_least(name, 0)
+        for name in ("labels", "source_noise_floor"):
+            if getattr(self, name) is not None:
+                self._at_least(name, 0)
+        for name in ("sigma_c", "sigma_t"):
+            if not getattr(self, name) > 0:
+                raise _bad(name, "a number above 0", getattr(self, name))
+
+    @property
+    def noise_floors(self) -> tuple[float, float]:
+        """Least noise variances of the source and of the target view."""
+        floor_x = self.source_noise_floor
+        return (self.sigma_c**2 if floor_x is None else floor_x), self.target_noise_floor
+
+    def _at_least(self, name: str, least: int) -> None:
+        value = getattr(self, name)
+        if not value >= least:
+            raise _bad(name, f"at least {least}", value)
+
+    def with_changes(self, changes: dict[str, Any]) -> Settings:
+        """These settings with the given ones replaced.
+
+        Raises
+        ------
+        InputError
+            For an unknown name or a value of the wrong type.
+        """
+        known = {field.name for field in fields(self)}
+        unknown = sorted(set(changes) - known)
+        if unknown:
+            raise InputError(
+                unknown[0], "one of " + ", ".join(sorted(known)), "an unknown setting", "Remove it."
+            )
+        return replace(self, **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file's metadata."""
+        return asdict(self)
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """The table of settings in a TOML file; `Settings.with_changes` checks it.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            "the file", "TOML such as 'latent_dim = 8'", f"{error}", "Correct the file.", str(path)
+        ) from None
+
+
+def _check_type(name: str, value: object, hint: Any) -> None:
+    options = get_args(hint)
+    if options and all(isinstance(option, str) for option in options):  # Literal
+        if value not in options:
+            raise _bad(name, "one of " + ", ".join(options), value)
+        return
+    allowed = options or (hint,)
+    if float in allowed:
+        allowed = (*allowed, int)
+    if isinstance(value, bool) or not isinstance(value, allowed):
+        kinds = " or ".join(kind.__name__ for kind in allowed if kind is not type(None))
+        raise _bad(name, kinds, value)
+
+
+def _bad(name: str, expected: str, value: object) -> InputError:
+    return InputError(name, expected, repr(value), "Change the setting.")

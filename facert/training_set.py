@@ -1,0 +1,119 @@
+"""Which frames and poses of a take a method learns from."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, Take
+from facert.errors import InputError
+from facert.gaps import fill_gaps
+from facert.settings import Settings
+
+log = logging.getLogger(__name__)
+
+MIN_LABELS = 3
+# A frame is used for training when at least so much of it was observed.
+MIN_OBSERVED = 0.5
+# Gaps are filled from so many frames: enough for a covariance, few enough to be quick.
+FILL_FRAMES = 600
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """Complete arrays in the data's own units.
+
+    Parameters
+    ----------
+    X_labelled, Y_labelled : arrays, shapes (l, d_x) and (l, d_y)
+        Frames with their poses.
+    X_unlabelled : array, shape (m, d_x)
+        Frames without a pose.
+    Y_unlabelled : array, shape (n, d_y)
+        Poses without a frame.
+    frames : array of int, shape (l,)
+        The labelled frames' indices in the take.
+    """
+
+    X_labelled: FloatArray
+    Y_labelled: FloatArray
+    X_unlabelled: FloatArray
+    Y_unlabelled: FloatArray
+    frames: IntArray
+
+
+def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
+    """Draw labelled and unlabelled data as the settings ask, by their seed.
+
+    Labels are the frames whose pose is known, or ``settings.labels`` of them; every other frame
+    may serve as unlabelled source; `take.animation` is the unlabelled target.
+
+    Raises
+    ------
+    InputError
+        With fewer than three labels, more asked for than there are, or nothing that moves.
+    """
+    rng = np.random.default_rng(settings.seed)
+    labels = _choose_labels(take, settings, rng)
+    X = take.source.matrix
+    observed = np.mean(~np.isnan(X), axis=1)
+    usable = observed >= MIN_OBSERVED
+    if not usable[labels].all():
+        dropped = labels[~usable[labels]]
+        log.warning("%d posed frames show less than half of the source: left out", len(dropped))
+        labels = labels[usable[labels]]
+    if len(labels) < MIN_LABELS:
+        raise InputError(
+            "/target/params",
+            f"at least {MIN_LABELS} posed frames",
+            f"{len(labels)}",
+            "Pose more frames (10 to 40 serve well).",
+        )
+
+    others = np.setdiff1d(np.flatnonzero(usable), labels)
+    unlabelled = _draw(rng, others, settings.unlabelled)
+    filled = _filled(X, np.concatenate([labels, unlabelled]), rng)
+    animation = take.animation
+    assert take.params is not None
+    if animation is None:
+        animation = take.params[:0]
+    return TrainingSet(
+        X_labelled=filled[: len(labels)],
+        Y_labelled=take.params[labels],
+        X_unlabelled=filled[len(labels) :],
+        Y_unlabelled=animation[_draw(rng, np.arange(len(animation)), settings.unlabelled)],
+        frames=labels,
+    )
+
+
+def _choose_labels(take: Take, settings: Settings, rng: np.random.Generator) -> IntArray:
+    labels = take.labels
+    if settings.labels is None:
+        return labels
+    if settings.labels > len(labels):
+        raise InputError(
+            "labels",
+            f"at most {len(labels)}, the posed frames of the take",
+            f"{settings.labels}",
+            "Pose more frames or ask for fewer.",
+        )
+    return _draw(rng, labels, settings.labels)
+
+
+def _draw(rng: np.random.Generator, indices: IntArray, count: int) -> IntArray:
+    """So many of the indices at random, all of them when there are fewer; in rising order."""
+    chosen = rng.permutation(indices)[:count]
+    return np.sort(chosen)
+
+
+def _filled(X: FloatArray, rows: IntArray, rng: np.random.Generator) -> FloatArray:
+    """The rows of X with their gaps filled from the rest of the take."""
+    gaps = np.isnan(X[rows]).any(axis=1)
+    if not gaps.any():
+        return X[rows]
+    log.info("filled gaps in %d of %d training frames", int(gaps.sum()), len(rows))
+    rest = np.setdiff1d(np.arange(len(X)), rows)
+    support = np.concatenate([rows, _draw(rng, rest, max(FILL_FRAMES - len(rows), 0))])
+    return fill_gaps(X[support])[: len(rows)]

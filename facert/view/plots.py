@@ -1,0 +1,104 @@
+"""Curves of a take's controls over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from facert.data import Take
+from facert.errors import InputError
+from facert.view.render import require_poses
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CURVE, TRUTH, INK = "#1f6f8b", "#c9a26b", "#3a3f47"
+MOST = 8  # curves, if none are named
+
+
+def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = ()) -> Figure:
+    """Curves of some controls, one below the other.
+
+    The truth runs behind the take's curve; the band is twice the predictive standard deviation;
+    dots mark key poses where only a part of the frames is posed.
+
+    Parameters
+    ----------
+    take : Take
+        With poses.
+    truth : Take, optional
+        A take of the same performance with the controls that are drawn.
+    names : sequence of str
+        The controls to draw; the most varying ones if empty.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        When the take has no poses, or one of the takes lacks a control.
+    """
+    from matplotlib.figure import Figure
+
+    names = tuple(names) or _most_varying(take)
+    figure = Figure(figsize=(10, 1.05 * len(names) + 0.7), dpi=150, layout="constrained")
+    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(grid, names, strict=True):
+        if truth is not None:
+            values = require_poses(truth)[:, _column(truth, name)]
+            axes.plot(truth.time, values, color=TRUTH, linewidth=2.4, label="truth")
+        _draw_curve(axes, take, name)
+        _tidy(axes, name)
+    grid[-1].set_xlabel("seconds", color=INK)
+    if truth is not None or take.std is not None:
+        grid[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize=8)
+    return figure
+
+
+def _draw_curve(axes: Axes, take: Take, name: str) -> None:
+    column = _column(take, name)
+    values = require_poses(take)[:, column]
+    if take.std is not None:
+        band = 2 * take.std[:, column]
+        axes.fill_between(
+            take.time, values - band, values + band, color=CURVE, alpha=0.2, lw=0, label="± 2 std"
+        )
+    if len(take.labels) == len(take):
+        axes.plot(take.time, values, color=CURVE, linewidth=1.1, label="character")
+    else:
+        keys = take.labels
+        axes.plot(take.time[keys], values[keys], "o", color=CURVE, markersize=4, label="key poses")
+
+
+def _tidy(axes: Axes, name: str) -> None:
+    axes.set_ylabel(name, rotation=0, ha="right", va="center", color=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.005)
+    axes.tick_params(colors=INK, labelsize=8)
+
+
+def _most_varying(take: Take) -> tuple[str, ...]:
+    poses, controls = require_poses(take), take.controls
+    assert controls is not None  # poses come with controls
+    spread = poses[take.labels].std(axis=0)
+    chosen = np.sort(np.argsort(-spread, kind="stable")[:MOST])
+    return tuple(controls.names[index] for index in chosen)
+
+
+def _column(take: Take, name: str) -> int:
+    """Index of a control."""
+    require_poses(take)
+    assert take.controls is not None  # poses come with controls
+    if name not in take.controls.names:
+        raise InputError(
+            "/target/names",
+            "the controls that are to be drawn",
+            f"no {name!r}",
+            f"It has: {', '.join(take.controls.names)}.",
+        )
+    return take.controls.names.index(name)

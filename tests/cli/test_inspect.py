@@ -1,0 +1,53 @@
+import json
+
+import numpy as np
+import pytest
+
+from facert.data import Controls, Rig, Source, Take
+from facert.io.formats import write_rig_file, write_take_file
+
+
+@pytest.fixture
+def take_file(tmp_path):
+    values = np.random.default_rng(0).normal(size=(4, 2, 3))
+    values[0, 1] = np.nan
+    take = Take(
+        time=np.arange(4) / 30,
+        source=Source(values, ["nose", "[bold]chin"]),
+        controls=Controls(["jawOpen"], [[0, 1]]),
+        params=[[0.5], [np.nan], [1.0], [np.nan]],
+        units="cm",
+    )
+    write_take_file(take, tmp_path / "take.h5")
+    return tmp_path / "take.h5"
+
+
+def test_a_take_is_shown_in_a_table(facert, take_file):
+    shown = facert("inspect", take_file)
+    assert shown.code == 0
+    for fact in ("(2) nose, [bold]chin", "12.5%", "[bold]chin 25.0%", "0, 2", "0 to 1", "cm"):
+        assert fact in shown.out
+
+
+def test_json_is_for_programs(facert, take_file):
+    facts = json.loads(facert("inspect", take_file, "--json").out)
+    assert facts["file"] == str(take_file)
+    assert facts["kind"] == "take"
+    assert facts["source"]["names"] == ["nose", "[bold]chin"]
+    assert facts["source"]["missing"] == 0.125
+    assert facts["target"]["first_labels"] == [0, 2]
+    assert facts["target"]["limits"] == [[0.0, 1.0]]
+
+
+def test_a_rig_is_shown(facert, tmp_path):
+    rig = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))
+    write_rig_file(rig, tmp_path / "rig.h5")
+    facts = json.loads(facert("inspect", tmp_path / "rig.h5", "--json").out)
+    assert (facts["kind"], facts["vertices"], facts["triangles"]) == ("rig", 3, 1)
+    assert "jawOpen" in facert("inspect", tmp_path / "rig.h5").out
+
+
+def test_a_missing_file_is_bad_input(facert, tmp_path):
+    failed = facert("inspect", tmp_path / "none.h5")
+    assert failed.code == 3
+    assert "found nothing" in failed.err

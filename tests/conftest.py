@@ -1,0 +1,60 @@
+"""Fixtures that every test may use."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facert.data import Controls, Source, Take
+
+DEFAULT_DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of real recordings; tests that use it are marked `real`."""
+    folder = Path(os.environ.get("FACERT_DATA", DEFAULT_DATA))
+    if not (folder / "tracks").is_dir():
+        pytest.skip(f"no real recordings in {folder}: set FACERT_DATA to their folder")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def make_take() -> Callable[..., Take]:
+    """A synthetic take: a smooth walk in two dimensions moves markers and controls alike."""
+
+    def make(
+        frames: int = 60, posed: int = 12, animation: int = 20, markers: int = 5, seed: int = 0
+    ) -> Take:
+        rng = np.random.default_rng(seed)
+        to_markers = rng.normal(size=(5, 3 * markers))
+        to_controls = rng.normal(size=(5, 4)) / 4.0
+
+        time = np.arange(frames) / 30.0
+        walk = _walk(time)
+        params = np.full((frames, 4), np.nan)
+        labels = rng.permutation(frames)[:posed]
+        params[labels] = (walk @ to_controls)[labels]
+        others = _walk(rng.uniform(0.0, time[-1], animation)) @ to_controls
+        return Take(
+            time=time,
+            source=Source(
+                (walk @ to_markers).reshape(frames, markers, 3), [f"m{i}" for i in range(markers)]
+            ),
+            controls=Controls(["jaw", "smile", "brow", "blink"]),
+            params=params if posed else None,
+            animation=others if animation else None,
+            units="cm",
+        )
+
+    return make
+
+
+def _walk(time: np.ndarray) -> np.ndarray:
+    """A walk in the plane with its products, (T, 5): what it moves, it moves nonlinearly."""
+    a, b = np.sin(5.0 * time), np.cos(3.1 * time + 0.5)
+    return np.stack([a, b, a * b, a * a, b * b], axis=1)

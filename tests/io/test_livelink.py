@@ -1,0 +1,211 @@
+import csv
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facert.data import Controls, Source, Take
+from facert.errors import InputError
+from facert.io.livelink import (
+    format_timecode,
+    parse_timecode,
+    read_livelink,
+    write_livelink,
+)
+from facert.io.rate import nominal_rate
+from facert.names import ARKIT_NAMES, ARKIT_SHAPES
+
+DAY = 24 * 3600 * 60_000
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "face.csv"
+
+
+def write(path, names=ARKIT_SHAPES, timecodes=None, rows=None, bom=""):
+    timecodes = timecodes or ["01:00:00:00.000", "01:00:00:02.000", "01:00:00:04.000"]
+    if rows is None:
+        rows = [[str(len(names)), *np.linspace(0, 1, len(names)) * step] for step in range(3)]
+    lines = [["Timecode", "BlendShapeCount", *names]]
+    lines += [[timecode, *row] for timecode, row in zip(timecodes, rows, strict=True)]
+    text = "\n".join(",".join(str(cell) for cell in line) for line in lines)
+    path.write_text(f"{bom}{text}\n", encoding="utf-8")
+
+
+def weights_take(names, values, **changes):
+    return Take(time=np.arange(len(values)) / 30, source=Source(values, names), **changes)
+
+
+@given(st.integers(0, DAY - 1))
+def test_a_timecode_is_kept_to_its_last_digit(ticks):
+    assert parse_timecode(format_timecode(ticks)) == ticks
+
+
+def test_frames_of_a_timecode_count_sixtieths_of_a_second():
+    assert parse_timecode("13:13:04:31.652") == (13 * 3600 + 13 * 60 + 4) * 60_000 + 31_652
+    assert parse_timecode("0:00:01:30") == 90_000
+    for wrong in ("13:13:04", "13:61:04:00.0", "13:13:04:60.000", "a:b:c:d", ""):
+        assert parse_timecode(wrong) is None
+
+
+def test_columns_are_found_by_name_in_any_order_and_spelling(path):
+    names = [name.removesuffix("Left") + "_L" if name.endswith("Left") else name
+             for name in reversed(ARKIT_SHAPES)]  # fmt: skip
+    write(path, names=names, bom="\ufeff")
+    take = read_livelink(path)
+    assert take.source.names == ARKIT_SHAPES[::-1]
+    np.testing.assert_allclose(take.source.values[2], 2 * np.linspace(0, 1, 52), atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [51, 52, 61])
+def test_all_usual_numbers_of_columns_are_read(path, count):
+    write(path, names=ARKIT_NAMES[:count])
+    assert read_livelink(path).source.names == ARKIT_NAMES[:count]
+
+
+def test_an_unknown_column_stays_and_is_told_about(path, caplog):
+    write(path, names=[*ARKIT_SHAPES[:51], "tongeOut"])
+    assert read_livelink(path).source.names[-1] == "tongeOut"
+    assert "did you mean tongueOut" in caplog.text
+
+
+def test_rows_without_a_face_are_dropped_and_counted(path, caplog):
+    caplog.set_level(logging.INFO)
+    rows = [["0"], ["2", 0.1, 0.2], ["0", "", ""]]
+    write(path, names=ARKIT_NAMES[:2], rows=rows)
+    take = read_livelink(path)
+    assert len(take) == 1
+    assert take.start_timecode == "01:00:00:02.000"
+    assert "dropped 2 of 3 rows without a face" in caplog.text
+
+
+def test_time_goes_on_past_midnight(path):
+    write(path, timecodes=["23:59:59:58.000", "00:00:00:00.000", "00:00:00:02.000"])
+    np.testing.assert_allclose(read_livelink(path).time, [0, 2 / 60, 4 / 60], atol=1e-12)
+
+
+def test_rows_whose_time_does_not_rise_are_dropped_and_counted(path, caplog):
+    write(path, timecodes=["01:00:00:02.000", "01:00:00:02.000", "01:00:00:04.000"])
+    take = read_livelink(path)
+    assert take.source.values[:, 1].tolist() == [0.0, pytest.approx(2 / 51)]
+    write(path, timecodes=["01:00:00:02.000", "01:00:00:01.000", "01:00:00:02.000"])
+    assert len(read_livelink(path)) == 1
+    assert "dropped 1 rows" in caplog.text
+    assert "dropped 2 rows" in caplog.text
+
+
+@pytest.mark.parametrize("rate", [24.0, 30.0, 60.0])
+def test_the_rate_is_that_of_the_usual_spacing_whatever_the_gaps(rate):
+    time = np.delete(np.arange(100) / rate, [20, 21, 50]) + 1e-5 * np.sin(np.arange(97))
+    assert nominal_rate(time) == rate
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("01:00:00:06.000,2,0.1", "line 3: expected 4 cells"),
+        ("01:00:00:06.000,2,0.1,x", "line 3, column b: expected a number, found 'x'"),
+        ("one o'clock,2,0.1,0.2", "line 3, column Timecode: expected HH:MM:SS:FF.mmm"),
+        ('01:00:00:06.000,2,0.1,"0.2', "line 3"),
+        ("01:00:00:06.000,2,inf,0.2", "infinite"),
+    ],
+)
+def test_a_broken_row_is_named_by_its_line(path, line, message):
+    path.write_text(f"Timecode,BlendShapeCount,a,b\n01:00:00:04.000,2,0.1,0.2\n{line}\n")
+    with pytest.raises(InputError, match=message) as caught:
+        read_livelink(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a header and rows"),
+        ("Timecode,BlendShapeCount,a\n", "a header and rows"),
+        ("time,a\n0,1\n", "Timecode,BlendShapeCount"),
+        ("Timecode,BlendShapeCount,a\n01:00:00:04.000,0\n", "rows with a face"),
+        ("Timecode,BlendShapeCount,a,a\n01:00:00:04.000,2,1,1\n", "'a' twice"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(path, text, message):
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_livelink(path)
+
+
+def test_other_encodings_are_refused(path):
+    path.write_bytes("Timecode,BlendShapeCount,\xe9\n".encode("latin-1"))
+    with pytest.raises(InputError, match="UTF-8"):
+        read_livelink(path)
+
+
+def test_poses_are_written_before_source_weights(path):
+    take = weights_take(["jawOpen"], np.full((2, 1), 0.25))
+    take = replace(take, controls=Controls(["eyeBlink_L"]), params=[[1.08], [np.nan]])
+    write_livelink(take, path)
+    read = read_livelink(path)
+    assert read.source.names == ARKIT_NAMES
+    assert read.source.values[0, 0] == pytest.approx(1.08)
+    assert np.count_nonzero(read.source.values) == 1
+    assert len(read) == 1
+    assert path.read_text().splitlines()[2] == "00:00:00:02.000,0"
+
+
+def test_what_live_link_cannot_hold_is_refused_before_a_file_is_made(path):
+    markers = Take(time=[0.0], source=Source(np.zeros((1, 1, 3)), ["m"]))
+    foreign = weights_take(["jawOpn"], np.zeros((1, 1)))
+    partial = weights_take(["jawOpen", "jawLeft"], np.array([[0.0, np.nan]]))
+    odd_start = weights_take(["jawOpen"], np.zeros((1, 1)), start_timecode="noon")
+    for take, message in [
+        (markers, "markers only"),
+        (foreign, r"'jawOpn' \(nearest: 'jawOpen'\)"),
+        (partial, "known in part"),
+        (odd_start, "start_timecode"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            write_livelink(take, path)
+    assert not path.exists()
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, DAY - 1), st.lists(st.integers(1, 90_000), min_size=1, max_size=20))
+def test_timecodes_survive_the_way_through_a_file(tmp_path_factory, start, steps):
+    path = tmp_path_factory.mktemp("livelink") / "face.csv"
+    ticks = start + np.cumsum([0, *steps])
+    take = Take(
+        time=(ticks - start) / 60_000,
+        source=Source(np.zeros((len(ticks), 1)), ["jawOpen"]),
+        start_timecode=format_timecode(start),
+    )
+    write_livelink(take, path)
+    codes = [line.split(",")[0] for line in path.read_text().splitlines()[1:]]
+    assert codes == [format_timecode(int(tick)) for tick in ticks]
+    np.testing.assert_array_equal(read_livelink(path).time, take.time)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["rom", "utterance_b"])
+def test_a_recording_written_back_equals_the_original(real_data, tmp_path, name):
+    original = real_data / "recordings" / f"{name}.csv"
+    write_livelink(read_livelink(original), tmp_path / "back.csv")
+    with original.open() as one, (tmp_path / "back.csv").open() as other:
+        before, after = list(csv.reader(one)), list(csv.reader(other))
+    assert after[0] == before[0]
+    assert [row[:2] for row in after] == [row[:2] for row in before]
+    np.testing.assert_allclose(
+        np.array([row[2:] for row in after[1:]], float),
+        np.array([row[2:] for row in before[1:]], float),
+        atol=1e-6,
+    )
+
+
+@pytest.mark.real
+def test_a_recording_with_lost_faces_keeps_the_rest(real_data):
+    take = read_livelink(real_data / "recordings" / "utterance_a.csv")
+    assert len(take) == 1891
+    assert take.fps == 30.0
+    assert np.diff(take.time).max() > 2 / 30

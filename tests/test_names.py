@@ -1,0 +1,105 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from facert.errors import InputError
+from facert.names import (
+    ARKIT_ANGLES,
+    ARKIT_NAMES,
+    ARKIT_SHAPES,
+    NameIndex,
+    canonical,
+    control_groups,
+    match,
+    nearest,
+)
+
+
+def spellings(name):
+    """Ways in which programs write an ARKit name."""
+    snake = re.sub(r"(?<!^)([A-Z])", r"_\1", name).lower()
+    short = re.sub("Left$", "_L", re.sub("Right$", "_R", name))
+    return [name, name[0].upper() + name[1:], short, snake, snake.replace("_", "-"), name.lower()]
+
+
+def test_there_are_52_shapes_and_nine_angles():
+    assert (len(ARKIT_SHAPES), len(ARKIT_ANGLES), len(set(ARKIT_NAMES))) == (52, 9, 61)
+
+
+@pytest.mark.parametrize("name", ARKIT_NAMES)
+def test_every_spelling_of_an_arkit_name_is_one(name):
+    assert {canonical(spelling) for spelling in spellings(name)} == {name}
+
+
+@given(st.text(min_size=1))
+def test_a_canonical_name_is_its_own(name):
+    assert canonical(canonical(name)) == canonical(name)
+
+
+def test_other_names_stay_as_they_are():
+    assert canonical("eye-left-closure") == "eye-left-closure"
+    assert canonical("日本") == "日本"
+
+
+def test_the_nearest_name_is_a_hint():
+    assert nearest("eyeBlnik_L", ARKIT_NAMES) == "eyeBlinkLeft"
+    assert nearest("quux", ARKIT_NAMES) is None
+
+
+def test_a_name_is_found_as_it_is_spelled_before_any_other_spelling():
+    index = NameIndex(["smile_L", "smileLeft", "frownLeft"])
+    assert index.find("smileLeft") == 1
+    assert index.find("smile_L") == 0
+    assert index.find("SmileLeft") is None  # either could be meant
+    assert index.find("frown_l") == 2
+
+
+@given(st.permutations(ARKIT_NAMES))
+def test_names_are_matched_whatever_their_order(names):
+    upper = [name[0].upper() + name[1:] for name in ARKIT_NAMES]
+    assert [names[index] for index in match(upper, names, "names")] == list(ARKIT_NAMES)
+
+
+def test_a_name_without_a_match_is_told_with_the_nearest():
+    with pytest.raises(InputError, match=r"'jawOpn' \(and 1 more\), found nearest: 'JawOpen'"):
+        match(["jawLeft", "jawOpn", "nose"], ["JawOpen", "JawLeft"], "/source/names")
+
+
+@given(st.lists(st.text(min_size=1), unique=True, min_size=1))
+def test_every_control_is_in_one_group(names):
+    groups = control_groups(names)
+    together = np.concatenate(list(groups.values()))
+    assert sorted(together.tolist()) == list(range(len(names)))
+
+
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [
+        ("browInnerUp_L", "brows"),
+        ("eyebrows-left-extern-up", "brows"),
+        ("EyeBlinkLeft", "eyes"),
+        ("leftEyeYaw", "eyes"),
+        ("eye-left-closure", "eyes"),
+        ("cheekSquintLeft", "cheeks"),
+        ("nose-left-elevation", "nose"),
+        ("mouth-corner-puller", "mouth"),
+        ("tongueOut", "mouth"),
+        ("CTRL_L_lipCorner", "mouth"),
+        ("jawOpen", "jaw"),
+        ("HeadYaw", "head"),
+        ("neck-platysma", "head"),
+        ("squash", "other"),
+    ],
+)
+def test_controls_are_grouped_by_the_words_of_their_names(name, group):
+    assert list(control_groups([name])) == [group]
+
+
+def test_groups_come_in_a_fixed_order():
+    names = ["zap", "jawOpen", "mouthClose", "browDownLeft", "jawLeft"]
+    groups = {group: indices.tolist() for group, indices in control_groups(names).items()}
+    assert groups == {"brows": [3], "mouth": [2], "jaw": [1, 4], "other": [0]}
+    assert list(groups) == ["brows", "mouth", "jaw", "other"]
