@@ -108,18 +108,32 @@ class CurveLog(Monitor):
     def __init__(self, path: Path, overwrite: bool) -> None:
         if path.exists() and not overwrite:
             raise OutputExistsError(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Line buffering: the log can be followed, and survives a killed run.
-        self._file = path.open("w", encoding="utf-8", buffering=1)
-        self._file.write("iteration,objective,gradient_norm,seconds\n")
+        self.path = path
         self._began = time.perf_counter()
+
+    def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  only begins the file
+        """Begin the file: training is about to start."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.write_text("iteration,objective,gradient_norm,seconds\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(
+                "--log",
+                "a file that can be written",
+                f"{error.strerror}",
+                "Choose another place.",
+                str(self.path),
+            ) from error
+        return None
 
     def iteration(self, state: State) -> None:
         """Write one line."""
         seconds = time.perf_counter() - self._began
-        self._file.write(
-            f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
-        )
+        # Closed after each line: the log can be followed, and survives a killed run.
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(
+                f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
+            )
 
 
 class Monitors(Monitor):

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from facert.methods import Method, make_method
 from facert.methods.base import Labelled, Report, Unlabelled, stack_predictions
 from facert.names import match
 from facert.normalisation import Normalisation
-from facert.settings import Settings
+from facert.settings import LimitRule, Settings
 from facert.threads import threads_for
 from facert.training_set import choose_training_set
 
@@ -44,8 +44,6 @@ class Retargeter:
     ----------
     method : Method
         Works in normalised units.
-    settings : Settings
-        It was trained with these.
     source_kind, source_names : str, tuple of str
         What the source must hold.
     controls : Controls
@@ -57,7 +55,6 @@ class Retargeter:
     """
 
     method: Method
-    settings: Settings
     source_kind: SourceKind
     source_names: tuple[str, ...]
     controls: Controls
@@ -82,6 +79,8 @@ class Retargeter:
         InputError
             When the source is of another kind or lacks names that the model needs.
         """
+        if mode not in get_args(Mode):
+            raise InputError("mode", "offline or online", repr(mode), "Choose one of these.")
         source = self._matched(take.source)
         frames = self.source_units.apply(source.matrix)
         if mode == "online":
@@ -102,6 +101,11 @@ class Retargeter:
             std=prediction.std * self.target_units.scale,
             animation=None,
         )
+
+    @property
+    def settings(self) -> Settings:
+        """What it was trained with, defaults filled in."""
+        return self.method.settings
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -179,9 +183,8 @@ def train(
     take = replace(take, source=_observed_part(take.source))
     data = choose_training_set(take, settings)
     source_units = Normalisation.of(take.source.matrix, f"/source/{take.source.kind}")
-    target_units = Normalisation.of(
-        np.vstack([data.Y_labelled, data.Y_unlabelled]), "/target/params"
-    )
+    poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
+    target_units = Normalisation.of(poses, "/target/params")
     labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
     unlabelled = Unlabelled(
         source_units.apply(data.X_unlabelled), target_units.apply(data.Y_unlabelled)
@@ -190,10 +193,9 @@ def train(
     report = method.fit(labelled, unlabelled, monitor or Monitor())
     return Retargeter(
         method=method,
-        settings=settings,
         source_kind=take.source.kind,
         source_names=take.source.names,
-        controls=controls,
+        controls=replace(controls, limits=_limits(controls.limits, poses, settings.limits)),
         source_units=source_units,
         target_units=target_units,
         figures=_figures(report, labelled, unlabelled),
@@ -212,7 +214,7 @@ def load(path: str | Path) -> Retargeter:
     with reading(path):
         try:
             settings = Settings().with_changes(metadata["settings"])
-            kind, names = metadata["source_kind"], tuple(metadata["source_names"])
+            kind, names = metadata["source_kind"], tuple(map(str, metadata["source_names"]))
             controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
             source_units, target_units = (
                 Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
@@ -228,7 +230,6 @@ def load(path: str | Path) -> Retargeter:
         )
         retargeter = Retargeter(
             method,
-            settings,
             kind,
             names,
             controls,
@@ -249,6 +250,15 @@ def _observed_part(source: Source) -> Source:
     log.warning("never observed in the take, left out: %s", ", ".join(silent))
     names = tuple(name for name, there in zip(source.names, seen, strict=True) if there)
     return Source(source.values[:, seen], names)
+
+
+def _limits(declared: FloatArray | None, poses: FloatArray, rule: LimitRule) -> FloatArray | None:
+    """What poses are clipped to, (P, 2)."""
+    if rule == "none":
+        return None
+    if rule == "declared" or declared is not None:
+        return declared
+    return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
 
 
 def _figures(report: Report, labelled: Labelled, unlabelled: Unlabelled) -> dict[str, Any]:
@@ -272,15 +282,24 @@ def library_versions() -> dict[str, str]:
 
 
 def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None:
-    """Refuse a file whose parts disagree in size: mapping would fail, or worse, not fail."""
-    width = 3 if retargeter.source_kind == "markers" else 1
-    dimensions = {
-        "source": len(retargeter.source_names) * width,
-        "target": len(retargeter.controls.names),
-    }
-    for view, count in dimensions.items():
-        for name in (f"{view}.mean", f"method.{view}.observations"):
-            if arrays[name].shape[-1] != count:
-                raise InputError(
-                    name, f"{count} columns", f"{arrays[name].shape}", "Train the model again."
-                )
+    """Refuse a file whose parts disagree: mapping would fail, or worse, not fail."""
+    kind, names = retargeter.source_kind, retargeter.source_names
+    if kind not in get_args(SourceKind):
+        raise _misfit("source_kind", "markers or weights", repr(kind))
+    if len(set(names)) < len(names):
+        raise _misfit("source_names", "names that are all different", "one of them twice")
+    columns = len(names) * (3 if kind == "markers" else 1), len(retargeter.controls.names)
+    for view, count, learned in zip(
+        ("source", "target"), columns, retargeter.method.dimensions, strict=True
+    ):
+        mean, scale = arrays[f"{view}.mean"], arrays[f"{view}.scale"]
+        if mean.shape != (count,):
+            raise _misfit(f"{view}.mean", f"{count} numbers", f"shape {mean.shape}")
+        if learned != count:
+            raise _misfit(f"{view}.observations", f"{count} columns", f"{learned}")
+        if not scale.item() > 0.0:
+            raise _misfit(f"{view}.scale", "a number above 0", f"{scale.item()}")
+
+
+def _misfit(field: str, expected: str, found: str) -> InputError:
+    return InputError(field, expected, found, "Train the model again.")

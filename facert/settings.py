@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any, Literal, get_args, get_type_hints
 from facert.errors import InputError
 
 OptimiserName = Literal["lbfgs", "scg"]
+LimitRule = Literal["auto", "declared", "none"]
 
 
 @dataclass(frozen=True)
@@ -33,9 +35,10 @@ class Settings:
         q, dimensions of the latent space.
     neighbours : int
         k of the reconstruction constraints, Eq. (7).
-    sigma_c : float
+    sigma_c : float, optional
         Standard deviation of the measurement noise of the source, Eq. (13). It also sets the
-        noise floor of the source view.
+        noise floor of the source view. By default expected from the data, see
+        `facert.gplvm.noise`.
     sigma_t : float
         Standard deviation of the change from one cleaned frame to the next, Eq. (14); used when
         frames are mapped one after the other.
@@ -43,6 +46,9 @@ class Settings:
         Least noise variance 1/θ3 of the source view; by default sigma_c².
     target_noise_floor : float
         The same for the target view: how far, squared, a posed control may be off.
+    limits : {"auto", "declared", "none"}
+        What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
+        range of all poses in the take.
     optimizer : {"lbfgs", "scg"}
         L-BFGS-B, or the paper's scaled conjugate gradients.
     tolerance : float
@@ -50,7 +56,7 @@ class Settings:
     max_iterations : int
         Iterations at most.
     checkpoint_every : int
-        Iterations between two checkpoints.
+        Iterations between two checkpoints; L-BFGS begins with a new memory after each.
     device : str
         Where training runs: ``"cpu"`` or a torch CUDA device.
     """
@@ -61,14 +67,15 @@ class Settings:
     seed: int = 0
     latent_dim: int = 8
     neighbours: int = 8
-    sigma_c: float = 0.1
+    sigma_c: float | None = None
     sigma_t: float = 0.3
     source_noise_floor: float | None = None
-    target_noise_floor: float = 5e-2
+    target_noise_floor: float = 0.05
+    limits: LimitRule = "auto"
     optimizer: OptimiserName = "lbfgs"
     tolerance: float = 1e-6
     max_iterations: int = 2000
-    checkpoint_every: int = 100
+    checkpoint_every: int = 500
     device: str = "cpu"
 
     def __post_init__(self) -> None:
@@ -83,14 +90,9 @@ class Settings:
             if getattr(self, name) is not None:
                 self._at_least(name, 0)
         for name in ("sigma_c", "sigma_t"):
-            if not getattr(self, name) > 0:
-                raise _bad(name, "a number above 0", getattr(self, name))
-
-    @property
-    def noise_floors(self) -> tuple[float, float]:
-        """Least noise variances of the source and of the target view."""
-        floor_x = self.source_noise_floor
-        return (self.sigma_c**2 if floor_x is None else floor_x), self.target_noise_floor
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise _bad(name, "a number above 0", value)
 
     def _at_least(self, name: str, least: int) -> None:
         value = getattr(self, name)
@@ -146,6 +148,8 @@ def _check_type(name: str, value: object, hint: Any) -> None:
     if isinstance(value, bool) or not isinstance(value, allowed):
         kinds = " or ".join(kind.__name__ for kind in allowed if kind is not type(None))
         raise _bad(name, kinds, value)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise _bad(name, "a finite number", value)
 
 
 def _bad(name: str, expected: str, value: object) -> InputError:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Take
+from facert.data import BoolArray, FloatArray, IntArray, Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
 from facert.settings import Settings
@@ -56,21 +56,9 @@ def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
         With fewer than three labels, more asked for than there are, or nothing that moves.
     """
     rng = np.random.default_rng(settings.seed)
-    labels = _choose_labels(take, settings, rng)
     X = take.source.matrix
-    observed = np.mean(~np.isnan(X), axis=1)
-    usable = observed >= MIN_OBSERVED
-    if not usable[labels].all():
-        dropped = labels[~usable[labels]]
-        log.warning("%d posed frames show less than half of the source: left out", len(dropped))
-        labels = labels[usable[labels]]
-    if len(labels) < MIN_LABELS:
-        raise InputError(
-            "/target/params",
-            f"at least {MIN_LABELS} posed frames",
-            f"{len(labels)}",
-            "Pose more frames (10 to 40 serve well).",
-        )
+    usable = np.mean(~np.isnan(X), axis=1) >= MIN_OBSERVED
+    labels = _choose_labels(_usable_labels(take, usable), settings, rng)
 
     others = np.setdiff1d(np.flatnonzero(usable), labels)
     unlabelled = _draw(rng, others, settings.unlabelled)
@@ -88,18 +76,31 @@ def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
     )
 
 
-def _choose_labels(take: Take, settings: Settings, rng: np.random.Generator) -> IntArray:
+def _usable_labels(take: Take, usable: BoolArray) -> IntArray:
     labels = take.labels
-    if settings.labels is None:
-        return labels
-    if settings.labels > len(labels):
+    dropped = int((~usable[labels]).sum())
+    if dropped:
+        log.warning("%d posed frames show less than half of the source: left out", dropped)
+    return labels[usable[labels]]
+
+
+def _choose_labels(labels: IntArray, settings: Settings, rng: np.random.Generator) -> IntArray:
+    count = len(labels) if settings.labels is None else settings.labels
+    if count > len(labels):
         raise InputError(
             "labels",
             f"at most {len(labels)}, the posed frames of the take",
-            f"{settings.labels}",
+            f"{count}",
             "Pose more frames or ask for fewer.",
         )
-    return _draw(rng, labels, settings.labels)
+    if count < MIN_LABELS:
+        raise InputError(
+            "/target/params",
+            f"at least {MIN_LABELS} posed frames",
+            f"{count}",
+            "Pose more frames (10 to 40 serve well).",
+        )
+    return labels if settings.labels is None else _draw(rng, labels, count)
 
 
 def _draw(rng: np.random.Generator, indices: IntArray, count: int) -> IntArray:
@@ -116,4 +117,8 @@ def _filled(X: FloatArray, rows: IntArray, rng: np.random.Generator) -> FloatArr
     log.info("filled gaps in %d of %d training frames", int(gaps.sum()), len(rows))
     rest = np.setdiff1d(np.arange(len(X)), rows)
     support = np.concatenate([rows, _draw(rng, rest, max(FILL_FRAMES - len(rows), 0))])
+    # What none of them shows is taken from the first frame that does.
+    seen = ~np.isnan(X)
+    unseen = ~seen[support].any(axis=0)
+    support = np.concatenate([support, np.unique(seen[:, unseen].argmax(axis=0))])
     return fill_gaps(X[support])[: len(rows)]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from facert.cli import console
 from facert.errors import InputError, OutputExistsError, reading
+from facert.settings import Settings
 
 if TYPE_CHECKING:
     from facert.data import Take
@@ -17,6 +18,12 @@ if TYPE_CHECKING:
     from facert.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")
+DEFAULTS = Settings()
+
+
+def _setting(name: str, text: str) -> Any:
+    """An option that is None unless given, so that it can come before the config file."""
+    return typer.Option(help=text, show_default=str(getattr(DEFAULTS, name)))
 
 
 def command(
@@ -28,29 +35,33 @@ def command(
         Path, typer.Option("--output", "-o", help="Model file to write.")
     ] = DEFAULT_MODEL,
     method: Annotated[
-        str | None, typer.Option(help="ssgplvm (default), or sgplvm: labelled frames alone.")
+        str | None, _setting("method", "ssgplvm, or sgplvm: the labelled frames alone.")
     ] = None,
     labels: Annotated[
-        int | None, typer.Option(help="Use only so many of the posed frames, drawn at random.")
+        int | None,
+        typer.Option(help="Use only so many of the posed frames, at random.", show_default="all"),
     ] = None,
     unlabelled: Annotated[
-        int | None, typer.Option(help="Unlabelled frames, and poses, to learn from [100].")
+        int | None, _setting("unlabelled", "Frames without a pose, and poses without a frame.")
     ] = None,
-    latent_dim: Annotated[int | None, typer.Option(help="Latent dimensions [8].")] = None,
+    latent_dim: Annotated[int | None, _setting("latent_dim", "Latent dimensions.")] = None,
     neighbours: Annotated[
-        int | None, typer.Option(help="Neighbours in the local linear prior [8].")
+        int | None, _setting("neighbours", "Neighbours in the local linear prior.")
     ] = None,
     sigma_c: Annotated[
         float | None,
-        typer.Option(help="Capture noise, in units of the largest marker deviation [0.1]."),
+        _setting("sigma_c", "Capture noise, in units of the largest deviation of a coordinate."),
     ] = None,
-    optimizer: Annotated[
-        str | None, typer.Option(help="lbfgs (default) or scg, the paper's.")
+    limits: Annotated[
+        str | None,
+        _setting("limits", "Clip poses to: auto (declared, else seen), declared, or none."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="For every random choice [0].")] = None,
-    device: Annotated[str | None, typer.Option(help="cpu (default) or cuda.")] = None,
+    optimizer: Annotated[str | None, _setting("optimizer", "lbfgs, or scg (the paper's).")] = None,
+    seed: Annotated[int | None, _setting("seed", "For every random choice.")] = None,
+    device: Annotated[str | None, _setting("device", "cpu or cuda.")] = None,
     config: Annotated[
-        Path | None, typer.Option(help="TOML file of settings; options given here come before it.")
+        Path | None,
+        typer.Option(help="TOML file with any of the settings; options given here come first."),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue from the checkpoint beside the output.")
@@ -66,7 +77,8 @@ def command(
     ] = False,
 ) -> None:
     """Learn to retarget from a take's poses, its other frames, and old animation."""
-    if output.exists() and not overwrite:
+    overwrite_model = overwrite or resume  # an interrupted run leaves a model
+    if output.exists() and not overwrite_model:
         raise OutputExistsError(output)
     if output.suffix != ".safetensors":
         raise InputError("--output", "a name ending in .safetensors", str(output), "Rename it.")
@@ -77,6 +89,7 @@ def command(
         "latent_dim": latent_dim,
         "neighbours": neighbours,
         "sigma_c": sigma_c,
+        "limits": limits,
         "optimizer": optimizer,
         "seed": seed,
         "device": device,
@@ -85,9 +98,9 @@ def command(
     import facert
     from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
     from facert.cli.progress import ProgressBar
-    from facert.settings import Settings, read_settings
+    from facert.settings import read_settings
 
-    settings = Settings()
+    settings = DEFAULTS
     if config is not None:
         with reading(config):
             settings = settings.with_changes(read_settings(config))
@@ -101,8 +114,8 @@ def command(
         monitors.append(CurveLog(curve, overwrite))
     with reading(take or "the built-in take"), ProgressBar() as bar:
         retargeter = facert.train(data, settings, Monitors(*monitors, bar))
-    retargeter.save(output, overwrite)
-    if retargeter.figures["status"] != "interrupted":
+    retargeter.save(output, overwrite_model)
+    if retargeter.figures["status"] in ("converged", "stalled"):
         checkpoint.remove()
     _print_table(retargeter, output)
 

@@ -1,4 +1,4 @@
-"""Initial latent coordinates by semi-supervised manifold alignment (Ham, Lee and Saul 2005)."""
+"""Initial latent coordinates: manifold alignment (Ham, Lee and Saul 2005), or components."""
 
 from __future__ import annotations
 
@@ -34,3 +34,24 @@ def align(M: sparse.csr_array, latent_dim: int) -> FloatArray:
     largest = np.abs(vectors).argmax(axis=0)
     aligned: FloatArray = vectors * np.sign(vectors[largest, np.arange(latent_dim)])
     return aligned
+
+
+def principal_components(observations: FloatArray, latent_dim: int) -> FloatArray:
+    """Latent coordinates of points whose views are all known, for the supervised model.
+
+    Parameters
+    ----------
+    observations : array, shape (N, d)
+        Both views side by side.
+    latent_dim : int
+        q, less than N.
+
+    Returns
+    -------
+    array, shape (N, q)
+        Principal components, the largest with variance 1.
+    """
+    centred = observations - observations.mean(axis=0)
+    U, S, _ = np.linalg.svd(centred, full_matrices=False)
+    components: FloatArray = U[:, :latent_dim] * (S[:latent_dim] / S[0]) * np.sqrt(len(U))
+    return components

@@ -59,7 +59,7 @@ class SharedGPLVM(nn.Module):
         self.rows_x = len(X)
         self.noise_floor_x, self.noise_floor_y = noise_floor_x, noise_floor_y
 
-        self.Z = nn.Parameter(torch.from_numpy(np.array(Z, dtype=np.float64)))
+        self.Z = nn.Parameter(torch.from_numpy(np.array(Z, dtype=np.float64, order="C")))
         self.log_kernel_x = nn.Parameter(initial_log_kernel())
         self.log_kernel_y = nn.Parameter(initial_log_kernel())
 

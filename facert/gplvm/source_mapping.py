@@ -25,10 +25,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data import BoolArray, FloatArray
 from facert.gp.posterior import Posterior, PosteriorPoint
 
-MAX_ITERATIONS = 50
+MAX_ITERATIONS = 200  # in all; most frames need three or four
 # Newton decrement (nats) below which a frame counts as solved; the energy is a log-probability.
 DECREMENT = 1e-9
 # Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
@@ -92,7 +92,7 @@ class Mapped:
     x: FloatArray
     hessian: FloatArray
     energy: FloatArray
-    converged: np.typing.NDArray[np.bool_]
+    converged: BoolArray
 
 
 @dataclass(frozen=True)
@@ -183,18 +183,20 @@ class SourceMapping:
             step = _step(hessian[active], gradient[active], shift[active])
             descent = np.einsum("bq,bq->b", gradient[active], step)
             done = np.abs(descent) < DECREMENT
+            done[done] = ~_leave_saddles(hessian[active], step, descent, done)
             converged[active[done]] = True
             active, step, descent = active[~done], step[~done], descent[~done]
             if not len(active):
                 break
             at = self._expand(z[active] + step, observed[active])
-            better = (descent < 0.0) & (at.energy <= energy[active] + ROUNDING)
-            good, bad = active[better], active[~better]
+            fall = energy[active] - at.energy
+            foretold = -descent - 0.5 * np.einsum("bp,bpq,bq->b", step, hessian[active], step)
+            better = (descent < 0.0) & (fall >= -ROUNDING)
+            good = active[better]
             z[good] += step[better]
             energy[good], gradient[good] = at.energy[better], at.gradient[better]
             hessian[good], x[good] = at.hessian[better], at.x[better]
-            shift[good] = np.where(shift[good] > SHIFT, 0.1 * shift[good], 0.0)
-            shift[bad] = np.maximum(10.0 * shift[bad], SHIFT)
+            shift[active] = _adapted(shift[active], better, fall, foretold)
         return Mapped(z, x, hessian, energy, converged)
 
     def _best_start(self, observed: Observation, starts: list[FloatArray]) -> FloatArray:
@@ -237,6 +239,34 @@ class SourceMapping:
         diagonal = np.arange(z.shape[1])
         hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
         return _Expansion(_energy(z, at, w, r), gradient, hessian, at.mean - s[:, None] * wr)
+
+
+def _leave_saddles(
+    hessian: FloatArray, step: FloatArray, descent: FloatArray, done: BoolArray
+) -> BoolArray:
+    """Which of the frames that are done stand on a saddle; their steps are set to lead off it."""
+    values, vectors = np.linalg.eigh(hessian[done])
+    saddle = values[:, 0] < 0.0
+    rows = np.flatnonzero(done)[saddle]
+    # A fall of about 0.005 nats along the direction of negative curvature.
+    length = 0.1 / np.sqrt(-values[saddle, 0])
+    step[rows] = length[:, None] * vectors[saddle, :, 0]
+    descent[rows] = -DECREMENT
+    return saddle
+
+
+def _adapted(
+    shift: FloatArray, better: BoolArray, fall: FloatArray, foretold: FloatArray
+) -> FloatArray:
+    """The next shift: smaller where the quadratic model foretold the fall well, larger where not.
+
+    In a narrow curved valley a step may be better and yet far from what was foretold.
+    """
+    poor = ~better | (fall < 0.25 * foretold - ROUNDING)
+    well = better & (fall > 0.75 * foretold - ROUNDING)
+    raised = np.maximum(4.0 * shift, SHIFT)
+    lowered = np.where(shift > SHIFT, 0.25 * shift, 0.0)
+    return np.where(poor, raised, np.where(well, lowered, shift))
 
 
 def _step(hessian: FloatArray, gradient: FloatArray, shift: FloatArray) -> FloatArray:

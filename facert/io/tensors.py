@@ -100,7 +100,7 @@ def _metadata(header: Any, expected: str) -> dict[str, Any]:
     try:
         metadata = json.loads(header["__metadata__"][_KEY])
         found, version = metadata["format"], metadata["format_version"]
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, RecursionError):
         raise _damaged("the metadata", f"a {expected} file", "no facert metadata") from None
     if found != expected:
         raise InputError("format", expected, repr(found), f"Give a {expected} file.")

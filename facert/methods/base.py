@@ -15,6 +15,7 @@ import numpy as np
 from facert.data import FloatArray
 from facert.gplvm.training import Monitor
 from facert.optim.base import Result
+from facert.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,14 @@ class Stream(Protocol):
 
 
 class Method(Protocol):
-    """A way to learn the map from source to target."""
+    """A way to learn the map from source to target; after `fit`, its settings are complete."""
+
+    settings: Settings
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """d_x and d_y of what it was trained on."""
+        ...
 
     def fit(self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...) -> Report:
         """Learn from labelled frames and whatever unlabelled data the method can use."""

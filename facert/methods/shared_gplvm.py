@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import torch
+from scipy.sparse import csr_array
 
 from facert.data import FloatArray
 from facert.errors import DeviceError, InputError
 from facert.gp.kernel import Kernel
 from facert.gp.posterior import Posterior
-from facert.gplvm.alignment import align
+from facert.gplvm.alignment import align, principal_components
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
+from facert.gplvm.noise import expected_noise
 from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
 from facert.gplvm.target_mapping import map_to_target
 from facert.gplvm.training import Monitor, train
@@ -37,11 +41,17 @@ class SemiSupervisedSGPLVM:
     Parameters
     ----------
     settings : Settings
-        Latent dimension, neighbours, noise, optimiser, device.
+        Latent dimension, neighbours, noise, optimiser, device. `fit` fills in the noise of the
+        source where it is left open.
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+        self.settings = self._given = settings
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """d_x and d_y of what it was trained on."""
+        return self.source_.X.shape[1], self.target_.X.shape[1]
 
     def fit(
         self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
@@ -57,8 +67,8 @@ class SemiSupervisedSGPLVM:
         """
         X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
         count = len(labelled.X)
-        points = len(X) + len(Y) - count
-        with threads_for(points):
+        self.settings = _with_noise(self._given, X)
+        with threads_for(len(X) + len(Y) - count):
             module = self._initial_module(X, Y, count)
             result = train(
                 module.to(_device(self.settings.device)),
@@ -78,8 +88,7 @@ class SemiSupervisedSGPLVM:
     def predict(self, frames: FloatArray) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed."""
         with threads_for(len(self.source_.Z)):
-            observed = Observation.of(frames, self.settings.sigma_c)
-            return self._to_target(self.mapping_.solve(observed))
+            return self._to_target(self.mapping_.solve(self._observed(frames)))
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other, with the temporal term of Eq. (14)."""
@@ -105,6 +114,8 @@ class SemiSupervisedSGPLVM:
         InputError
             When an array is absent or the shapes do not fit together.
         """
+        if self.settings.sigma_c is None:
+            raise InputError("settings", "a number as sigma_c", "none", _DAMAGED)
         views = [_view(arrays, name) for name in ("source", "target")]
         if views[0].Z.shape[1] != views[1].Z.shape[1]:
             dimensions = [view.Z.shape[1] for view in views]
@@ -117,6 +128,10 @@ class SemiSupervisedSGPLVM:
         self.source_, self.target_ = source, target
         self.mapping_ = SourceMapping(source)
 
+    def _observed(self, frames: FloatArray) -> Observation:
+        assert self.settings.sigma_c is not None  # filled in by fit, checked by load
+        return Observation.of(frames, self.settings.sigma_c)
+
     def _to_target(self, mapped: Mapped) -> Prediction:
         if not mapped.converged.all():
             log.warning("%d frames did not converge", int((~mapped.converged).sum()))
@@ -124,18 +139,27 @@ class SemiSupervisedSGPLVM:
         return Prediction(mean, std, mapped.x)
 
     def _initial_module(self, X: FloatArray, Y: FloatArray, labelled: int) -> SharedGPLVM:
-        M = constraint_matrix(X, Y, labelled, self.settings.neighbours)
-        latent_dim = min(self.settings.latent_dim, M.shape[1] - 1)
+        points = len(X) + len(Y) - labelled
+        latent_dim = min(self.settings.latent_dim, points - 1)
         if latent_dim < self.settings.latent_dim:
-            log.warning("%d points carry only %d latent dimensions", M.shape[1], latent_dim)
-        floors = self.settings.noise_floors
-        return SharedGPLVM(X, Y, labelled, M, align(M, latent_dim), *floors)
+            log.warning("%d points carry only %d latent dimensions", points, latent_dim)
+        M, Z = self._prior_and_start(X, Y, labelled, latent_dim)
+        floor_x, floor_y = self.settings.source_noise_floor, self.settings.target_noise_floor
+        assert floor_x is not None  # filled in before
+        return SharedGPLVM(X, Y, labelled, M, Z, floor_x, floor_y)
+
+    def _prior_and_start(
+        self, X: FloatArray, Y: FloatArray, labelled: int, latent_dim: int
+    ) -> tuple[csr_array | None, FloatArray]:
+        """Constraints of the latent prior, Eq. (6), and latents that satisfy them best."""
+        M = constraint_matrix(X, Y, labelled, self.settings.neighbours)
+        return M, align(M, latent_dim)
 
     def _optimiser(self) -> Optimiser:
         return OPTIMISERS[self.settings.optimizer]()
 
     def _figures(self, labelled: Labelled) -> dict[str, float]:
-        figures: dict[str, float] = {}
+        figures: dict[str, float] = {"sigma_c": self.settings.sigma_c or math.nan}
         for view, posterior in (("source", self.source_), ("target", self.target_)):
             for index, value in enumerate(posterior.kernel.theta, start=1):
                 figures[f"{view} theta{index}"] = value
@@ -145,7 +169,7 @@ class SemiSupervisedSGPLVM:
 
 
 class SupervisedSGPLVM(SemiSupervisedSGPLVM):
-    """Ek (2009): the labelled frames alone."""
+    """Ek (2009): the labelled frames alone, with P(Z) = N(0, I), begun at principal components."""
 
     def fit(
         self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
@@ -153,6 +177,15 @@ class SupervisedSGPLVM(SemiSupervisedSGPLVM):
         """Train on the labelled frames; the unlabelled data is not used."""
         nothing = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
         return super().fit(labelled, nothing, monitor)
+
+    def _prior_and_start(
+        self,
+        X: FloatArray,
+        Y: FloatArray,
+        labelled: int,  # noqa: ARG002  all rows are
+        latent_dim: int,
+    ) -> tuple[csr_array | None, FloatArray]:
+        return None, principal_components(np.hstack([X, Y]), latent_dim)
 
 
 class _SharedStream:
@@ -162,14 +195,24 @@ class _SharedStream:
 
     def step(self, frame: FloatArray) -> Prediction:
         """Map one more frame (1, d_x)."""
-        settings = self.method.settings
-        observed = Observation.of(frame, settings.sigma_c)
+        observed = self.method._observed(frame)
         starts = []
         if self.previous is not None:
-            observed = observed.following(self.previous.x, settings.sigma_t)
+            observed = observed.following(self.previous.x, self.method.settings.sigma_t)
             starts.append(self.previous.z)
         self.previous = self.method.mapping_.solve(observed, *starts)
         return self.method._to_target(self.previous)
+
+
+def _with_noise(settings: Settings, X: FloatArray) -> Settings:
+    """The settings with the noise of the source filled in where it is left open."""
+    sigma_c = settings.sigma_c
+    if sigma_c is None:
+        sigma_c = expected_noise(X, settings.latent_dim)
+    floor = settings.source_noise_floor
+    return replace(
+        settings, sigma_c=sigma_c, source_noise_floor=sigma_c**2 if floor is None else floor
+    )
 
 
 def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
@@ -181,8 +224,10 @@ def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
         settings.method,
         settings.latent_dim,
         settings.neighbours,
-        settings.noise_floors,
+        round(settings.source_noise_floor or 0.0, 6),
+        settings.target_noise_floor,
         settings.optimizer,
+        settings.checkpoint_every,
         X.shape,
         Y.shape,
     )

@@ -43,7 +43,7 @@ class State:
     stalled: bool = False
 
 
-# Called after each iteration; True ends the run.
+# Called after each iteration that descended; True ends the run.
 Watcher = Callable[[State], bool]
 
 
@@ -55,7 +55,7 @@ class Optimiser(Protocol):
         ...
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
-        """At most so many further iterations; `watch` sees each and may end the run."""
+        """At most so many further iterations; `watch` sees each descent and may end the run."""
         ...
 
 

@@ -37,30 +37,14 @@ class LBFGS:
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
         """At most so many further iterations; `watch` sees each and may end the run."""
-        latest = state
-        gradients: dict[bytes, float] = {}
-
-        def evaluate(x: FloatArray) -> tuple[float, FloatArray]:
-            value, gradient = objective(x)
-            gradients[x.tobytes()] = float(np.linalg.norm(gradient))
-            return value, gradient
-
-        def callback(intermediate_result: OptimizeResult) -> None:
-            nonlocal latest
-            x = np.array(intermediate_result.x)
-            norm = gradients.get(x.tobytes(), np.nan)
-            gradients.clear()
-            latest = State(x, float(intermediate_result.fun), norm, latest.iterations + 1)
-            if watch(latest):
-                raise StopIteration
-
+        stage = _Stage(objective, state, watch)
         found = minimize(
-            evaluate,
+            stage.evaluate,
             state.x,
             jac=True,
             method="L-BFGS-B",
             bounds=[(-self.bound, self.bound)] * len(state.x),
-            callback=callback,
+            callback=stage.note,
             options={
                 "maxiter": iterations,
                 "maxfun": 20 * iterations,
@@ -71,4 +55,40 @@ class LBFGS:
             },
         )
         # 0 and 2 end by themselves: no descent is left. 1 is the iteration limit, 99 the watcher.
-        return replace(latest, stalled=found.status in (0, 2))
+        return replace(stage.state, stalled=found.status in (0, 2))
+
+
+class _Stage:
+    """One run of SciPy's minimiser: what it is told, and the state it has come to."""
+
+    def __init__(self, objective: Objective, state: State, watch: Watcher) -> None:
+        self.objective, self.state, self.watch = objective, state, watch
+        self._gradient = np.zeros_like(state.x)  # at the state; set by the first evaluation
+        self._gradients: dict[bytes, FloatArray] = {}  # since the last iteration
+
+    def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = self.objective(x)
+        if not np.isfinite(value):
+            return self._steep(x)
+        self._gradients[x.tobytes()] = gradient
+        if np.array_equal(x, self.state.x):
+            self._gradient = gradient
+        return value, gradient
+
+    def _steep(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """In place of infinity, which SciPy's line search cannot take.
+
+        A parabola from the state through x, so steep that its minimum is a tenth of the way.
+        """
+        step = x - self.state.x
+        fall = abs(float(self._gradient @ step))
+        return self.state.value + 4.0 * fall, 9.0 * fall / float(step @ step) * step
+
+    def note(self, intermediate_result: OptimizeResult) -> None:
+        x = np.array(intermediate_result.x)
+        self._gradient = self._gradients[x.tobytes()]
+        self._gradients.clear()
+        norm = float(np.linalg.norm(self._gradient))
+        self.state = State(x, float(intermediate_result.fun), norm, self.state.iterations + 1)
+        if self.watch(self.state):
+            raise StopIteration

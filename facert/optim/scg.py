@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +11,41 @@ from facert.data import FloatArray
 from facert.optim.base import Objective, State, Watcher, initial_state
 
 SIGMA = 1e-5  # step of the finite difference that gives the curvature, relative to 1/|p|
-LAMBDA_START, LAMBDA_MIN, LAMBDA_MAX = 1e-6, 1e-15, 1e20
+SCALE_START, SCALE_MIN, SCALE_MAX = 1e-6, 1e-15, 1e20  # Møller's λ
+FLAT = 1e-150  # a slope this small cannot be squared
+# Comparison (step 6) that stands for an infinite trial: the next step is a fifth as long.
+INFINITELY_WORSE = -3.0
+
+
+@dataclass(frozen=True)
+class _Memory:
+    """What the next iteration needs besides x; curvature along p is known after a rejection."""
+
+    gradient: FloatArray
+    direction: FloatArray
+    scale: float
+    successes: int = 0
+    curvature: float | None = None
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, FloatArray]) -> _Memory:
+        scale, successes, *curvature = arrays["scalars"].tolist()
+        known = curvature[0] if curvature else None
+        return cls(arrays["gradient"], arrays["direction"], scale, int(successes), known)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        known = [] if self.curvature is None else [self.curvature]
+        return {
+            "gradient": self.gradient,
+            "direction": self.direction,
+            "scalars": np.array([self.scale, self.successes, *known]),
+        }
+
+    def descending(self) -> _Memory:
+        """Steepest descent in place of a direction that no longer descends."""
+        if self.direction @ self.gradient < 0.0:
+            return self
+        return _Memory(self.gradient, -self.gradient, self.scale)
 
 
 class SCG:
@@ -24,78 +59,67 @@ class SCG:
     def start(self, objective: Objective, x: FloatArray) -> State:
         """Step 1: the first direction is the steepest descent."""
         state, gradient = initial_state(objective, x)
-        memory = _memory(gradient, -gradient, LAMBDA_START, np.nan, 0)
-        return replace(state, memory=memory)
+        return replace(state, memory=_Memory(gradient, -gradient, SCALE_START).arrays())
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
-        """At most so many further iterations; `watch` sees each and may end the run."""
+        """At most so many further iterations; `watch` sees each descent and may end the run."""
         for _ in range(iterations):
+            before = state.value
             state = self._step(objective, state)
-            if state.stalled or watch(state):
+            # A rejected trial is no sign of convergence: the next one is shorter.
+            if state.stalled or (state.value < before and watch(state)):
                 break
         return state
 
     def _step(self, objective: Objective, state: State) -> State:
-        x, value = state.x, state.value
-        gradient, direction = state.memory["gradient"], state.memory["direction"]
-        scale, curvature, successes = state.memory["scalars"]
-
+        memory = _Memory.of(state.memory).descending()
+        gradient, direction = memory.gradient, memory.direction
         slope = float(direction @ gradient)
-        if slope >= 0.0:  # no longer a descent direction: begin again
-            direction, slope, curvature, successes = (
-                -gradient,
-                -float(gradient @ gradient),
-                np.nan,
-                0,
-            )
         squared = float(direction @ direction)
-        if squared == 0.0:
+        if slope > -FLAT:
             return replace(state, stalled=True)
 
-        if np.isnan(curvature):  # step 2; after a rejected trial x and p are the same, and so is it
+        curvature = memory.curvature
+        if curvature is None:  # step 2
             sigma = SIGMA / np.sqrt(squared)
-            _, ahead = objective(x + sigma * direction)
+            _, ahead = objective(state.x + sigma * direction)
             curvature = float(direction @ (ahead - gradient)) / sigma
-
-        # Steps 3 and 4: make the scaled curvature positive.
-        scaled = curvature + scale * squared
-        if scaled <= 0.0:
+        scale = memory.scale
+        scaled = curvature + scale * squared  # step 3
+        if scaled <= 0.0:  # step 4
             scale = 2.0 * (scale - scaled / squared)
             scaled = curvature + scale * squared
-        alpha = -slope / scaled
 
-        # Steps 5 to 7: compare the decrease with the quadratic model's.
-        trial = x + alpha * direction
-        trial_value, trial_gradient = objective(trial)
-        comparison = 2.0 * scaled * (value - trial_value) / slope**2
-        accepted = bool(comparison >= 0.0)  # false for an infinite trial value as well
+        trial = state.x - slope / scaled * direction  # step 5
+        value, trial_gradient = objective(trial)
+        comparison = INFINITELY_WORSE
+        if np.isfinite(value):  # step 6
+            comparison = 2.0 * scaled * (state.value - value) / slope**2
+        scale = _rescaled(scale, scaled / squared, comparison)  # steps 7 and 8
+        state = replace(state, iterations=state.iterations + 1, stalled=scale > SCALE_MAX)
 
-        if not accepted or comparison < 0.25:
-            rise = scaled * (1.0 - comparison) / squared if np.isfinite(comparison) else 4.0 * scale
-            scale = max(scale + rise, 4.0 * scale)
-        elif comparison > 0.75:
-            scale = max(0.25 * scale, LAMBDA_MIN)
-
-        iterations = state.iterations + 1
-        if not accepted:
-            memory = _memory(gradient, direction, scale, curvature, successes)
-            return replace(state, iterations=iterations, memory=memory, stalled=scale > LAMBDA_MAX)
-        successes += 1
-        if successes % len(x) == 0:
-            direction = -trial_gradient
-        else:
+        if comparison < 0.0:
+            rejected = replace(memory, scale=scale, curvature=curvature)
+            return replace(state, memory=rejected.arrays())
+        successes = memory.successes + 1
+        following = -trial_gradient
+        if successes % len(trial):  # otherwise begin again with the steepest descent
             beta = float(trial_gradient @ (trial_gradient - gradient)) / -slope
-            direction = beta * direction - trial_gradient
-        memory = _memory(trial_gradient, direction, scale, np.nan, successes)
-        norm = float(np.linalg.norm(trial_gradient))
-        return State(trial, trial_value, norm, iterations, memory)
+            following += beta * direction
+        accepted = _Memory(trial_gradient, following, scale, successes)
+        return replace(
+            state,
+            x=trial,
+            value=value,
+            gradient_norm=float(np.linalg.norm(trial_gradient)),
+            memory=accepted.arrays(),
+        )
 
 
-def _memory(
-    gradient: FloatArray, direction: FloatArray, scale: float, curvature: float, successes: float
-) -> dict[str, FloatArray]:
-    return {
-        "gradient": gradient,
-        "direction": direction,
-        "scalars": np.array([scale, curvature, successes]),
-    }
+def _rescaled(scale: float, curvature: float, comparison: float) -> float:
+    """λ for the next step, by how well the quadratic model foretold this one's decrease."""
+    if comparison < 0.25:
+        return max(scale + curvature * (1.0 - comparison), 4.0 * scale)
+    if comparison > 0.75:
+        return max(0.25 * scale, SCALE_MIN)
+    return scale

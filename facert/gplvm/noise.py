@@ -1,0 +1,37 @@
+"""How much noise to expect in a capture when nobody says.
+
+To a model of q latent dimensions, whatever q directions cannot carry is noise, be it of the
+measurement or of motion too small to model. Its variance in one direction is estimated by the
+first principal variance left over, λ_{q+1}: an exact capture of simple speech gets a small one, so
+that lids and brows count beside a large jaw; a rich or noisy capture a larger one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facert.data import FloatArray
+
+# Normalised units. Below the first, source mapping begins to stick to the training latents (their
+# predictive variance vanishes, see facert.gp.kernel); above the second, small motion is lost.
+LEAST, MOST = 0.03, 0.1
+
+
+def expected_noise(X: FloatArray, latent_dim: int) -> float:
+    """σ_c, the standard deviation of the noise in a normalised source.
+
+    Parameters
+    ----------
+    X : array, shape (n, d)
+        Normalised frames.
+    latent_dim : int
+        q.
+
+    Returns
+    -------
+    float
+        √λ_{q+1}, not below `LEAST` nor above `MOST`.
+    """
+    deviations = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) / np.sqrt(len(X))
+    left_over = deviations[latent_dim] if latent_dim < len(deviations) else 0.0
+    return float(np.clip(left_over, LEAST, MOST))

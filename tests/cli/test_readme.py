@@ -1,0 +1,60 @@
+"""Every command and every line of Python in the README works as printed."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+PYTHON = [block for language, block in BLOCKS if language == "python"]
+COMMANDS = [
+    shlex.split(line)[1:]
+    for language, block in BLOCKS
+    for line in block.splitlines()
+    if not language and line.startswith("facert ")
+]
+
+
+@pytest.mark.slow
+def test_quick_start_and_python_run_as_printed(facert, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_take, use_from_python = PYTHON
+
+    exec(write_take, {})
+    for command in COMMANDS:
+        outcome = facert(*command)
+        assert outcome.code == 0, outcome.err
+    exec(use_from_python, {})
+
+    assert len(COMMANDS) == 5
+    assert (tmp_path / "curves.png").exists()
+    assert (tmp_path / "python.h5").exists()
+
+
+def test_every_command_is_in_the_table(facert):
+    listed = set(re.findall(r"^\| `facert (\w+)", README, re.MULTILINE))
+    offered = set(re.findall(r"^│ (\w+) ", facert("--help").out, re.MULTILINE))
+
+    assert listed == offered
+
+
+def test_settings_table_shows_the_defaults():
+    from facert.settings import Settings
+
+    settings = Settings().as_dict()
+    rows = dict(re.findall(r"^\| (`[\w`, ]+`) \| ([^|]+) \|", README, re.MULTILINE))
+    names = [name for row in rows for name in re.findall(r"`(\w+)`", row) if name in settings]
+
+    assert sorted(names) == sorted(settings)
+    for row, shown in rows.items():
+        values = [part.strip().strip("`") for part in shown.split(",")]
+        for name, value in zip(re.findall(r"`(\w+)`", row), values, strict=False):
+            default = settings.get(name)
+            if default is None:
+                continue
+            expected = f'"{default}"' if isinstance(default, str) else default
+            assert value == expected or float(value) == expected

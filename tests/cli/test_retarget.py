@@ -1,0 +1,186 @@
+import json
+import pickle
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from safetensors.numpy import load, save
+
+import facert as api
+from facert import Settings
+from facert.data import Controls
+
+
+@pytest.fixture(scope="module")
+def trained(make_take):
+    """A retargeter whose controls have names of ARKit."""
+    return api.train(
+        arkit(make_take()), Settings(latent_dim=3, neighbours=5, unlabelled=30, max_iterations=30)
+    )
+
+
+def arkit(take):
+    return replace(
+        take, controls=Controls(["jawOpen", "mouthSmileLeft", "browInnerUp", "cheekPuff"])
+    )
+
+
+@pytest.fixture
+def files(trained, make_take, tmp_path):
+    """Take, output and model."""
+    trained.save(tmp_path / "model.safetensors")
+    api.write_take(arkit(make_take(posed=60)), tmp_path / "take.h5")
+    return tmp_path / "take.h5", tmp_path / "out.h5", tmp_path / "model.safetensors"
+
+
+def test_the_result_holds_poses_their_std_and_the_cleaned_source(facert, files, trained):
+    take, out, model = files
+    assert facert("retarget", take, out, "--model", model).code == 0
+    expected, result = trained.retarget(api.read_take(take)), api.read_take(out)
+    np.testing.assert_allclose(result.params, expected.params, atol=1e-10)
+    np.testing.assert_allclose(result.std, expected.std, atol=1e-10)
+    np.testing.assert_allclose(result.source.values, expected.source.values, atol=1e-10)
+
+
+def test_where_the_truth_is_known_errors_are_told_by_part_of_the_face(facert, files):
+    take, out, model = files
+    done = facert("retarget", take, out, "--model", model)
+    assert "RMS against the 60 poses" in done.out
+    for word in ("jaw", "mouth", "brows", "cheeks", "all"):
+        assert word in done.out
+
+
+def test_without_truth_or_with_that_of_another_character_there_is_no_table(
+    facert, files, make_take
+):
+    take, out, model = files
+    for target in (make_take(posed=0, animation=0), make_take(posed=60)):
+        api.write_take(target, take, overwrite=True)
+        done = facert("retarget", take, out, "--model", model, "--overwrite")
+        assert done.code == 0
+        assert "RMS" not in done.out
+
+
+def test_the_mode_is_chosen(facert, files, trained):
+    take, out, model = files
+    assert facert("retarget", take, out, "--model", model, "--mode", "online").code == 0
+    expected = trained.retarget(api.read_take(take), "online")
+    np.testing.assert_allclose(api.read_take(out).params, expected.params, atol=1e-10)
+
+
+@pytest.mark.parametrize("ending", ["csv", "livelink.csv"])
+def test_the_ending_decides_the_format(facert, files, tmp_path, ending):
+    take, _, model = files
+    out = tmp_path / f"out.{ending}"
+    done = facert("retarget", take, out, "--model", model)
+    assert done.code == 0, done.err
+    header, *rows = out.read_text().splitlines()
+    assert "awOpen" in header
+    assert len(rows) == 60
+
+
+def test_an_existing_result_stays_unless_it_may_be_replaced(facert, files):
+    take, out, model = files
+    out.write_text("mine")
+    refused = facert("retarget", take, out, "--model", model)
+    assert refused.code == 2
+    assert "--overwrite" in refused.err
+    assert out.read_text() == "mine"
+    assert facert("retarget", take, out, "--model", model, "--overwrite").code == 0
+
+
+def test_the_take_may_be_replaced_by_its_result_only_when_asked(facert, files):
+    take, _, model = files
+    before = take.read_bytes()
+    assert facert("retarget", take, take, "--model", model).code == 2
+    assert take.read_bytes() == before
+
+
+def metadata_of(model):
+    content = model.read_bytes()
+    header = json.loads(content[8 : 8 + struct.unpack("<Q", content[:8])[0]])
+    return header["__metadata__"]
+
+
+def pickled(model):
+    model.write_bytes(pickle.dumps({"weights": [1.0]}))
+
+
+def truncated(model):
+    model.write_bytes(model.read_bytes()[:-100])
+
+
+def header_bomb(model):
+    model.write_bytes(struct.pack("<Q", 2**62) + b"{}")
+
+
+def with_nan(model):
+    arrays, metadata = load(model.read_bytes()), metadata_of(model)
+    arrays["method.source.latents"] = np.full_like(arrays["method.source.latents"], np.nan)
+    model.write_bytes(save(arrays, metadata))
+
+
+def checkpoint(model):
+    arrays, metadata = load(model.read_bytes()), metadata_of(model)
+    content = {**json.loads(metadata["facert"]), "format": "facert-checkpoint"}
+    model.write_bytes(save(arrays, {"facert": json.dumps(content)}))
+
+
+def missing(model):
+    model.unlink()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (pickled, "the header: expected a safetensors file"),
+        (truncated, "the header: expected a valid safetensors header"),
+        (header_bomb, "the header: expected a safetensors file"),
+        (with_nan, "method.source.latents: expected finite float64 numbers"),
+        (checkpoint, "format: expected facert-model, found 'facert-checkpoint'"),
+        (missing, "expected"),
+    ],
+)
+def test_a_bad_model_gets_one_line_and_leaves_no_file(facert, files, tmp_path, spoil, message):
+    take, out, model = files
+    spoil(model)
+    before = set(tmp_path.iterdir())
+    failed = facert("retarget", take, out, "--model", model)
+    assert failed.code == 3
+    (line,) = failed.err.splitlines()
+    assert line.startswith(f"error: {model}: ")
+    assert message in line
+    assert set(tmp_path.iterdir()) == before
+
+
+def with_other_names(take):
+    return replace(take, source=replace(take.source, names=["m0", "m1", "m2", "m3", "nose"]))
+
+
+def with_weights(take):
+    matrix = take.source.matrix
+    return replace(take, source=api.Source(matrix, [f"w{i}" for i in range(matrix.shape[1])]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (with_other_names, "/source/names: expected"),
+        (with_weights, "/source: expected markers, found weights"),
+    ],
+)
+def test_a_take_that_does_not_fit_the_model_is_named(facert, files, make_take, change, message):
+    take, out, model = files
+    api.write_take(change(make_take()), take, overwrite=True)
+    failed = facert("retarget", take, out, "--model", model)
+    assert failed.code == 3
+    assert f"{take}: {message}" in failed.err
+    assert not out.exists()
+
+
+def test_an_ending_without_a_format_is_refused(facert, files, tmp_path):
+    take, _, model = files
+    failed = facert("retarget", take, tmp_path / "out.docx", "--model", model)
+    assert failed.code == 3
+    assert not (tmp_path / "out.docx").exists()

@@ -1,0 +1,267 @@
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+import facert as api
+from facert.checkpoint import checkpoint_path
+
+QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
+
+
+@pytest.fixture
+def take(make_take, tmp_path):
+    path = tmp_path / "take.h5"
+    api.write_take(make_take(), path)
+    return path
+
+
+@pytest.fixture
+def model(tmp_path):
+    return tmp_path / "model.safetensors"
+
+
+def test_a_model_is_written_and_a_table_of_how_it_went(facert, take, model):
+    done = facert("train", take, "-o", model, *QUICK)
+    assert done.code == 0
+    for word in ("objective", "iterations", "seconds", "theta1", "training reconstruction"):
+        assert word in done.out
+    assert api.load(model).figures["labelled frames"] == 12
+    assert not checkpoint_path(model).exists()
+
+
+def test_options_are_kept_with_the_model(facert, take, model):
+    options = ("--labels", 6, "--seed", 3, "--method", "sgplvm", "--optimizer", "scg")
+    assert facert("train", take, "-o", model, *QUICK, *options).code == 0
+    settings = api.load(model).settings
+    assert (settings.labels, settings.seed) == (6, 3)
+    assert (settings.method, settings.optimizer) == ("sgplvm", "scg")
+
+
+def test_options_come_before_the_config_file(facert, take, model, tmp_path):
+    (tmp_path / "c.toml").write_text("latent_dim = 2\nsigma_t = 0.7\nmax_iterations = 5\n")
+    assert facert("train", take, "-o", model, "--config", tmp_path / "c.toml", *QUICK).code == 0
+    settings = api.load(model).settings
+    assert (settings.latent_dim, settings.sigma_t) == (3, 0.7)
+
+
+def test_the_curve_is_logged(facert, take, model, tmp_path):
+    assert facert("train", take, "-o", model, "--log", tmp_path / "curve.csv", *QUICK).code == 0
+    curve = np.genfromtxt(tmp_path / "curve.csv", delimiter=",", names=True)
+    assert curve["objective"][-1] == api.load(model).figures["objective"]
+    assert (np.diff(curve["objective"]) < 0).all()
+
+
+def test_existing_outputs_stay_unless_they_may_be_replaced(facert, take, model, tmp_path):
+    model.write_text("mine")
+    refused = facert("train", take, "-o", model, *QUICK)
+    assert refused.code == 2
+    assert "--overwrite" in refused.err
+    assert model.read_text() == "mine"
+    assert facert("train", take, "-o", model, "--overwrite", *QUICK).code == 0
+    (tmp_path / "curve.csv").write_text("mine")
+    other = tmp_path / "other.safetensors"
+    assert facert("train", take, "-o", other, "--log", tmp_path / "curve.csv", *QUICK).code == 2
+    assert (tmp_path / "curve.csv").read_text() == "mine"
+    assert not other.exists()
+
+
+def stopped_in_training(number, arguments, checkpoint):
+    """Exit code of ``facert`` in a process of its own, sent a signal once it has a checkpoint."""
+    # A shell may start its background jobs with Ctrl-C ignored.
+    code = """
+import signal
+from facert.cli.app import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+main()
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    while not checkpoint.exists() and process.poll() is None:
+        time.sleep(0.001)
+    process.send_signal(number)
+    return process.wait()
+
+
+@pytest.fixture
+def slow(tmp_path):
+    """Settings that leave time to stop a run."""
+    path = tmp_path / "slow.toml"
+    path.write_text("checkpoint_every = 15\ntolerance = 0.0\nmax_iterations = 300\n")
+    return path
+
+
+@pytest.mark.parametrize("optimizer", ["lbfgs", "scg"])
+def test_a_killed_run_resumes_to_the_same_objective(facert, make_take, slow, tmp_path, optimizer):
+    take = tmp_path / "take.h5"
+    api.write_take(make_take(frames=160, animation=100), take)
+    options = ("--config", slow, "--optimizer", optimizer)
+    killed, whole = tmp_path / "killed.safetensors", tmp_path / "whole.safetensors"
+
+    first = ("train", take, "-o", killed, *options)
+    code = stopped_in_training(signal.SIGKILL, first, checkpoint_path(killed))
+    assert code == -signal.SIGKILL
+    assert not killed.exists()
+    resumed = facert(*first, "--resume")
+    assert resumed.code == 0, resumed.err
+    assert facert("train", take, "-o", whole, *options).code == 0
+
+    a, b = api.load(killed).figures, api.load(whole).figures
+    assert a["iterations"] == b["iterations"]
+    assert a["objective"] == pytest.approx(b["objective"], rel=1e-6)
+
+
+def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow, model, tmp_path):
+    take, quick = tmp_path / "take.h5", tmp_path / "quick.toml"
+    quick.write_text("checkpoint_every = 15\nmax_iterations = 5000\n")
+    api.write_take(make_take(frames=160, animation=100), take)
+    arguments = ("train", take, "-o", model, "--config", slow)
+    assert stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model)) == 0
+    stopped = api.load(model).figures
+    assert stopped["status"] == "interrupted"
+    assert checkpoint_path(model).exists()
+
+    assert facert(*arguments, "--resume").code == 0
+    finished = api.load(model).figures
+    assert finished["iterations"] > stopped["iterations"]
+    assert finished["objective"] < stopped["objective"]
+    assert finished["status"] == "iteration limit"
+
+    assert facert(*arguments[:-1], quick, "--resume").code == 0
+    assert api.load(model).figures["status"] == "converged"
+    assert not checkpoint_path(model).exists()
+
+
+def test_a_checkpoint_of_another_take_is_refused(facert, make_take, take, slow, model, tmp_path):
+    arguments = ("train", take, "-o", model, "--config", slow)
+    stopped_in_training(signal.SIGKILL, arguments, checkpoint_path(model))
+    other = tmp_path / "other.h5"
+    api.write_take(make_take(seed=1), other)
+    refused = facert("train", other, "-o", model, "--config", slow, "--resume")
+    assert refused.code == 3
+    assert f"{checkpoint_path(model)}: fingerprint: expected" in refused.err
+    assert not model.exists()
+
+
+def test_resuming_without_a_checkpoint_trains_anew(facert, take, model):
+    done = facert("train", take, "-o", model, *QUICK, "--resume")
+    assert done.code == 0
+    assert "training begins anew" in done.err
+
+
+def rewrite(path, change):
+    """Change the open take file."""
+    with h5py.File(path, "r+") as file:
+        change(file)
+
+
+def truncate(path, make_take):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def link_elsewhere(path, make_take):
+    def link(file):
+        del file["/time"]
+        file["/time"] = h5py.ExternalLink("other.h5", "/time")
+
+    rewrite(path, link)
+
+
+def hide_everything(path, make_take):
+    def hide(file):
+        file["/source/markers"][...] = np.nan
+        if "/source/valid" in file:
+            del file["/source/valid"]
+
+    rewrite(path, hide)
+
+
+def pose_two(path, make_take):
+    api.write_take(make_take(posed=2), path, overwrite=True)
+
+
+def freeze(path, make_take):
+    take = make_take()
+    still = take.source.with_matrix(np.ones_like(take.source.matrix))
+    api.write_take(replace(take, source=still), path, overwrite=True)
+
+
+def remove_targets(path, make_take):
+    take = replace(make_take(), controls=None, params=None, animation=None)
+    api.write_take(take, path, overwrite=True)
+
+
+def spoil_nothing(path, make_take):
+    pass
+
+
+def remove(path, make_take):
+    path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "options", "message"),
+    [
+        (truncate, (), "take.h5: file: expected a whole HDF5 file"),
+        (link_elsewhere, (), "take.h5: /time: expected data in the file itself"),
+        (hide_everything, (), "take.h5: /source/markers: expected at least one observed value"),
+        (pose_two, (), "take.h5: /target/params: expected at least 3 posed frames, found 2"),
+        (freeze, (), "take.h5: /source/markers: expected values that change"),
+        (remove_targets, (), "take.h5: /target: expected poses"),
+        (remove, (), "take.h5"),
+        (spoil_nothing, ("--labels", 2), "take.h5: /target/params: expected at least 3"),
+        (spoil_nothing, ("--labels", 99), "take.h5: labels: expected at most 12"),
+        (spoil_nothing, ("--latent-dim", 0), "the options: latent_dim: expected at least 1"),
+        (spoil_nothing, ("--optimizer", "adam"), "the options: optimizer: expected one of"),
+        (spoil_nothing, ("--method", "magic"), "method: expected one of ssgplvm"),
+    ],
+)
+def test_bad_input_gets_one_line_and_leaves_no_file(
+    facert, make_take, take, model, tmp_path, spoil, options, message
+):
+    spoil(take, make_take)
+    before = set(tmp_path.iterdir())
+    failed = facert("train", take, "-o", model, "--log", tmp_path / "curve.csv", *options)
+    assert failed.code == 3
+    (line,) = [line for line in failed.err.splitlines() if line.startswith("error:")]
+    assert message in line
+    assert "Traceback" not in failed.err
+    assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("latent_dims = 8", "latent_dims: expected one of"),
+        ("latent_dim = 'many'", "latent_dim: expected int"),
+        ("latent_dim = ", "the file: expected TOML"),
+        ("sigma_c = inf", "sigma_c: expected a finite number"),
+    ],
+)
+def test_a_slip_in_the_config_file_is_named(facert, take, model, tmp_path, content, message):
+    (tmp_path / "c.toml").write_text(content)
+    failed = facert("train", take, "-o", model, "--config", tmp_path / "c.toml")
+    assert failed.code == 3
+    assert f"c.toml: {message}" in failed.err
+    assert not model.exists()
+
+
+def test_a_device_that_is_not_there_is_wrong_usage(facert, take, model):
+    failed = facert("train", take, "-o", model, "--device", "cuda:99")
+    assert failed.code == 2
+    assert "--device cuda:99" in failed.err
+    assert not model.exists()
+
+
+def test_the_model_needs_its_ending(facert, take, tmp_path):
+    failed = facert("train", take, "-o", tmp_path / "model.pt")
+    assert failed.code == 3
+    assert "--output: expected a name ending in .safetensors" in failed.err

@@ -1,0 +1,136 @@
+import logging
+
+import numpy as np
+import pytest
+
+from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
+from facert.errors import InputError, OutputExistsError
+from facert.gplvm.training import Monitor, Progress
+from facert.io.tensors import write_tensors
+from facert.optim.base import State
+from facert.optim.scg import SCG
+
+
+def bowl(x):
+    return float(x @ x), 2.0 * x
+
+
+def go_on(state):
+    return False
+
+
+@pytest.fixture
+def progress():
+    state = SCG().advance(bowl, SCG().start(bowl, np.arange(3.0)), 1, go_on)
+    return Progress(state, (5.0, state.value))
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "model.checkpoint.safetensors"
+
+
+def save(path, progress, fingerprint="a"):
+    file = CheckpointFile(path, resume=False)
+    file.resume(fingerprint)
+    file.checkpoint(progress)
+
+
+def test_the_checkpoint_lies_beside_the_model(tmp_path):
+    assert checkpoint_path(tmp_path / "m.safetensors") == tmp_path / "m.checkpoint.safetensors"
+
+
+def test_the_progress_of_an_optimiser_comes_back_whole(path, progress):
+    save(path, progress)
+    found = CheckpointFile(path, resume=True).resume("a")
+    assert found.curve == progress.curve
+    assert found.state.value == progress.state.value
+    assert found.state.iterations == progress.state.iterations
+    np.testing.assert_array_equal(found.state.x, progress.state.x)
+    assert found.state.memory.keys() == progress.state.memory.keys()
+    for name, array in progress.state.memory.items():
+        np.testing.assert_array_equal(found.state.memory[name], array)
+
+
+def test_nothing_is_resumed_unless_asked_for(path, progress, caplog):
+    save(path, progress)
+    assert CheckpointFile(path, resume=False).resume("a") is None
+    assert "--resume continues it" in caplog.text
+
+
+def test_a_missing_checkpoint_is_told_and_training_begins_anew(path, caplog):
+    assert CheckpointFile(path, resume=True).resume("a") is None
+    assert "training begins anew" in caplog.text
+
+
+def test_a_checkpoint_of_another_run_is_refused(path, progress):
+    save(path, progress)
+    with pytest.raises(InputError, match=r"model\.checkpoint\.safetensors: fingerprint"):
+        CheckpointFile(path, resume=True).resume("b")
+
+
+def test_a_checkpoint_without_its_arrays_is_refused(path):
+    metadata = {"format": "facert-checkpoint", "format_version": 1, "fingerprint": "a"}
+    write_tensors(path, {"x": np.zeros(2)}, metadata)
+    with pytest.raises(InputError, match="expected x, curve and scalars"):
+        CheckpointFile(path, resume=True).resume("a")
+
+
+def test_a_finished_run_leaves_no_checkpoint(path, progress):
+    save(path, progress)
+    CheckpointFile(path, resume=True).remove()
+    assert not path.exists()
+    CheckpointFile(path, resume=True).remove()
+
+
+def test_the_curve_is_written_as_training_goes(tmp_path):
+    log = CurveLog(tmp_path / "logs" / "curve.csv", overwrite=False)
+    log.resume("a")
+    for iteration in (1, 2):
+        log.iteration(State(np.zeros(1), 0.1 * iteration, 3.0, iteration))
+    lines = (tmp_path / "logs" / "curve.csv").read_text().splitlines()
+    assert lines[0] == "iteration,objective,gradient_norm,seconds"
+    assert lines[1].startswith("1,0.1,3.0,")
+    assert len(lines) == 3
+
+
+def test_an_existing_curve_stays_unless_it_may_be_replaced(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("mine")
+    with pytest.raises(OutputExistsError):
+        CurveLog(path, overwrite=False)
+    assert path.read_text() == "mine"
+
+
+def test_no_curve_is_begun_before_training_is(tmp_path):
+    CurveLog(tmp_path / "curve.csv", overwrite=False)
+    assert not (tmp_path / "curve.csv").exists()
+
+
+def test_several_monitors_are_all_told(progress):
+    class Counter(Monitor):
+        def __init__(self, resumed=None):
+            self.calls, self.resumed = [], resumed
+
+        def resume(self, fingerprint):
+            self.calls.append(fingerprint)
+            return self.resumed
+
+        def iteration(self, state):
+            self.calls.append(state)
+
+        def checkpoint(self, progress):
+            self.calls.append(progress)
+
+    parts = Counter(), Counter(progress), Counter()
+    monitors = Monitors(*parts)
+    assert monitors.resume("a") is progress
+    monitors.iteration(progress.state)
+    monitors.checkpoint(progress)
+    assert all(part.calls == ["a", progress.state, progress] for part in parts)
+
+
+def test_only_what_matters_is_logged(path, progress, caplog):
+    caplog.set_level(logging.DEBUG)
+    save(path, progress)
+    assert not caplog.records

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from facert.gaps import fill_gaps
+
+
+def rows(n=300, d=9, rank=3, noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(n, rank)) @ rng.normal(size=(rank, d)) + noise * rng.normal(size=(n, d))
+
+
+def with_gaps(X, share, seed=1):
+    gaps = np.random.default_rng(seed).random(X.shape) < share
+    return np.where(gaps, np.nan, X), gaps
+
+
+def test_complete_rows_are_handed_back():
+    X = rows()
+    assert fill_gaps(X) is X
+
+
+def test_what_was_observed_is_never_changed():
+    X, gaps = with_gaps(rows(noise=0.1), 0.3)
+    filled = fill_gaps(X)
+    np.testing.assert_array_equal(filled[~gaps], X[~gaps])
+    assert np.isfinite(filled).all()
+    assert np.isnan(X).any(), "the argument keeps its gaps"
+
+
+def test_gaps_in_correlated_columns_are_filled_far_better_than_by_the_mean():
+    truth = rows(noise=0.05)
+    X, gaps = with_gaps(truth, 0.2)
+    error = (fill_gaps(X) - truth)[gaps].std()
+    assert error < 0.1 * (np.nanmean(X, axis=0) - truth)[gaps].std()
+
+
+def test_columns_that_tell_nothing_of_each_other_are_filled_with_their_mean():
+    X, gaps = with_gaps(np.random.default_rng(0).normal(size=(3000, 2)) + 5.0, 0.2)
+    np.testing.assert_allclose(fill_gaps(X)[gaps], 5.0, atol=0.2)
+
+
+def test_a_row_without_any_observation_gets_the_mean():
+    X = rows(noise=0.1)
+    X[3] = np.nan
+    np.testing.assert_allclose(fill_gaps(X)[3], np.nanmean(X, axis=0), atol=0.02)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_the_unit_does_not_matter(scale):
+    X, _ = with_gaps(rows(noise=0.1), 0.2)
+    np.testing.assert_allclose(fill_gaps(scale * X), scale * fill_gaps(X), rtol=1e-6, atol=1e-9)

@@ -1,0 +1,62 @@
+import pytest
+
+from facert.errors import InputError
+from facert.settings import Settings, read_settings
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("latent_dim", 0, "at least 1"),
+        ("latent_dim", 2.5, "int"),
+        ("latent_dim", "8", "int"),
+        ("latent_dim", True, "int"),
+        ("labels", -1, "at least 0"),
+        ("unlabelled", None, "int"),
+        ("seed", -1, "at least 0"),
+        ("sigma_c", 0.0, "above 0"),
+        ("sigma_c", float("nan"), "finite"),
+        ("sigma_t", float("inf"), "finite"),
+        ("tolerance", float("inf"), "finite"),
+        ("target_noise_floor", -1.0, "at least 0"),
+        ("optimizer", "adam", "one of lbfgs, scg"),
+        ("device", 1, "str"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named(name, value, expected):
+    with pytest.raises(InputError, match=rf"^{name}: expected .*{expected}.*found"):
+        Settings(**{name: value})
+
+
+def test_an_integer_will_do_where_a_number_is_due():
+    assert Settings(sigma_c=1).sigma_c == 1
+
+
+def test_changes_leave_the_rest_as_it_was():
+    changed = Settings(seed=3).with_changes({"latent_dim": 4})
+    assert (changed.seed, changed.latent_dim) == (3, 4)
+
+
+def test_an_unknown_name_is_told_with_the_known_ones():
+    with pytest.raises(InputError, match=r"latent_dims: expected one of .*latent_dim"):
+        Settings().with_changes({"latent_dims": 4})
+
+
+def test_settings_survive_the_way_through_a_dictionary():
+    settings = Settings(labels=5, optimizer="scg", source_noise_floor=0.5)
+    assert Settings().with_changes(settings.as_dict()) == settings
+
+
+def test_settings_are_read_from_toml(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text('latent_dim = 4\noptimizer = "scg"\n')
+    assert read_settings(path) == {"latent_dim": 4, "optimizer": "scg"}
+
+
+@pytest.mark.parametrize("content", [b"latent_dim = ", b"\xff\xfe", None])
+def test_a_file_that_is_no_toml_is_refused(tmp_path, content):
+    path = tmp_path / "settings.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=r"settings\.toml: the file: expected TOML"):
+        read_settings(path)
