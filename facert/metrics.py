@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, Take
-from facert.names import control_groups
+from facert.data import Controls, FloatArray, IntArray, Rig, Take
+from facert.names import control_groups, match
 
 
 def rms(errors: FloatArray) -> float:
@@ -76,3 +76,88 @@ def compare(truth: Take, result: Take) -> Comparison | None:
         for name, members in control_groups(result.controls.names).items()
     )
     return Comparison(len(rows), errors.shape[1], rms(errors), groups)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How far poses are from the true ones, in every measure that methods are compared by.
+
+    Parameters
+    ----------
+    rms : float
+        Over frames and controls, in the controls' own units: the papers' measure.
+    per_control : tuple of float, length P
+        The same for each control.
+    rms_normalised : float
+        The errors of each control divided by its range first; controls that never move are left
+        out. 1 is as far off as a control can be.
+    jitter : float or None
+        RMS second difference of the error over consecutive frames, in the controls' own units;
+        None when no three frames follow each other.
+    vertex_rms, vertex_p95 : float or None
+        RMS distance over the vertices of a frame: mean and 95th percentile over the frames, in
+        the rig's units; None without a rig.
+    """
+
+    rms: float
+    per_control: tuple[float, ...]
+    rms_normalised: float
+    jitter: float | None = None
+    vertex_rms: float | None = None
+    vertex_p95: float | None = None
+
+
+def score(
+    errors: FloatArray, frames: IntArray, ranges: FloatArray, gram: FloatArray | None = None
+) -> Scores:
+    """Every measure of the errors of some frames.
+
+    Parameters
+    ----------
+    errors : array, shape (n, P)
+        Poses less the true ones, in the controls' own units.
+    frames : array of int, shape (n,)
+        Which frames of the take they belong to, rising.
+    ranges : array, shape (P,)
+        Largest less smallest value of each control.
+    gram : array, shape (P, P), optional
+        The rig's, from `vertex_gram`.
+    """
+    moving = ranges > 0
+    vertex = None if gram is None else vertex_errors(errors, gram)
+    return Scores(
+        rms=rms(errors),
+        per_control=tuple(np.sqrt(np.mean(np.square(errors), axis=0)).tolist()),
+        rms_normalised=rms(errors[:, moving] / ranges[moving]) if moving.any() else 0.0,
+        jitter=jitter(errors, frames),
+        vertex_rms=None if vertex is None else float(vertex.mean()),
+        vertex_p95=None if vertex is None else float(np.percentile(vertex, 95)),
+    )
+
+
+def jitter(errors: FloatArray, frames: IntArray) -> float | None:
+    """RMS second difference of errors (n, P) wherever three of the frames (n,) are consecutive."""
+    consecutive = (np.diff(frames)[:-1] == 1) & (np.diff(frames)[1:] == 1)
+    return rms(np.diff(errors, n=2, axis=0)[consecutive]) if consecutive.any() else None
+
+
+def vertex_gram(rig: Rig, controls: Controls) -> FloatArray:
+    """Inner products of a rig's shapes by vertex, (P, P), in the order of the controls.
+
+    A rig is linear, so that the mean squared distance of the vertices of two poses that differ by
+    e is e^T G e, whatever the number of vertices.
+
+    Raises
+    ------
+    InputError
+        When the rig lacks one of the controls.
+    """
+    chosen = match(controls.names, rig.names, "/names")
+    shapes = rig.shapes[chosen].reshape(len(chosen), -1)
+    return np.asarray(shapes @ shapes.T / len(rig.neutral))
+
+
+def vertex_errors(errors: FloatArray, gram: FloatArray) -> FloatArray:
+    """RMS distance over the vertices of each frame, (n,), for errors (n, P) of the controls."""
+    squared = np.einsum("np,pq,nq->n", errors, gram, errors, optimize=True)
+    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))

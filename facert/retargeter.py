@@ -7,6 +7,7 @@ and nothing else undoes it.
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -20,8 +21,8 @@ from facert.data import Controls, FloatArray, Source, SourceKind, Take
 from facert.errors import InputError, reading
 from facert.gplvm.training import Monitor
 from facert.io.tensors import read_tensors, write_tensors
-from facert.methods import Method, make_method
-from facert.methods.base import Labelled, Report, Unlabelled, stack_predictions
+from facert.methods import make_method
+from facert.methods.base import Labelled, Method, Report, Unlabelled, stack_predictions
 from facert.names import match
 from facert.normalisation import Normalisation
 from facert.settings import LimitRule, Settings
@@ -63,7 +64,9 @@ class Retargeter:
     figures: dict[str, Any]
 
     def retarget(self, take: Take, mode: Mode = "offline") -> Take:
-        """The take with a pose and its standard deviation in every frame, and a cleaned source.
+        """The take with a pose in every frame, and a cleaned source.
+
+        Where the method has one, each pose comes with its standard deviation.
 
         Parameters
         ----------
@@ -98,7 +101,7 @@ class Retargeter:
             source=source.with_matrix(self.source_units.undo(prediction.X)),
             controls=self.controls,
             params=params,
-            std=prediction.std * self.target_units.scale,
+            std=None if prediction.std is None else prediction.std * self.target_units.scale,
             animation=None,
         )
 
@@ -190,7 +193,9 @@ def train(
         source_units.apply(data.X_unlabelled), target_units.apply(data.Y_unlabelled)
     )
     method = make_method(settings)
+    began = time.perf_counter()
     report = method.fit(labelled, unlabelled, monitor or Monitor())
+    seconds = time.perf_counter() - began
     return Retargeter(
         method=method,
         source_kind=take.source.kind,
@@ -198,7 +203,7 @@ def train(
         controls=replace(controls, limits=_limits(controls.limits, poses, settings.limits)),
         source_units=source_units,
         target_units=target_units,
-        figures=_figures(report, labelled, unlabelled),
+        figures=_figures(report, seconds, labelled, unlabelled),
     )
 
 
@@ -261,19 +266,24 @@ def _limits(declared: FloatArray | None, poses: FloatArray, rule: LimitRule) -> 
     return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
 
 
-def _figures(report: Report, labelled: Labelled, unlabelled: Unlabelled) -> dict[str, Any]:
-    result = report.result
-    return {
+def _figures(
+    report: Report, seconds: float, labelled: Labelled, unlabelled: Unlabelled
+) -> dict[str, Any]:
+    figures: dict[str, Any] = {
         "labelled frames": len(labelled.X),
         "unlabelled frames": len(unlabelled.X),
         "unlabelled poses": len(unlabelled.Y),
-        "objective": result.value,
-        "gradient norm": result.gradient_norm,
-        "iterations": result.iterations,
-        "seconds": result.seconds,
-        "status": result.status,
-        **report.figures,
+        "seconds": seconds,
     }
+    result = report.result
+    if result is not None:
+        figures |= {
+            "objective": result.value,
+            "gradient norm": result.gradient_norm,
+            "iterations": result.iterations,
+            "status": result.status,
+        }
+    return figures | dict(report.figures)
 
 
 def library_versions() -> dict[str, str]:

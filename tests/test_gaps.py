@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from facert.gaps import fill_gaps
+from facert import gaps
+from facert.gaps import Gaussian, fill_gaps
 
 
 def rows(n=300, d=9, rank=3, noise=0.0, seed=0):
@@ -49,3 +50,38 @@ def test_a_row_without_any_observation_gets_the_mean():
 def test_the_unit_does_not_matter(scale):
     X, _ = with_gaps(rows(noise=0.1), 0.2)
     np.testing.assert_allclose(fill_gaps(scale * X), scale * fill_gaps(X), rtol=1e-6, atol=1e-9)
+
+
+def conditional_mean(gaussian, row):
+    """Of what one row hides, by the textbook."""
+    h = np.isnan(row)
+    gain = np.linalg.solve(gaussian.covariance[np.ix_(~h, ~h)], (row - gaussian.mean)[~h])
+    return gaussian.mean[h] + gaussian.covariance[np.ix_(h, ~h)] @ gain
+
+
+@pytest.mark.parametrize("chunk", [1, 500, gaps.CHUNK])
+def test_new_frames_are_filled_by_the_conditional_mean_whatever_each_hides(chunk, monkeypatch):
+    monkeypatch.setattr(gaps, "CHUNK", chunk)
+    gaussian = Gaussian.of(rows(noise=0.1))
+    X, _ = with_gaps(rows(n=50, noise=0.1, seed=2), 0.4)
+    X[7], X[8] = np.nan, 0.0
+    filled = gaussian.fill(X)
+    for row, result in zip(X, filled, strict=True):
+        np.testing.assert_allclose(result[np.isnan(row)], conditional_mean(gaussian, row))
+        np.testing.assert_array_equal(result[~np.isnan(row)], row[~np.isnan(row)])
+    np.testing.assert_allclose(filled[7], gaussian.mean)
+
+
+def test_a_gaussian_of_complete_rows_has_their_moments():
+    X = rows(noise=0.1)
+    gaussian = Gaussian.of(X)
+    np.testing.assert_allclose(gaussian.mean, X.mean(axis=0))
+    np.testing.assert_allclose(gaussian.covariance, np.cov(X.T, bias=True), atol=1e-4)
+
+
+def test_fitted_through_gaps_a_gaussian_keeps_the_variance_that_filling_takes_away():
+    X = rows(n=2000, noise=1.0)
+    gappy, _ = with_gaps(X, 0.3)
+    plain = np.cov(fill_gaps(gappy).T, bias=True).trace()
+    whole, fitted = np.cov(X.T, bias=True).trace(), np.trace(Gaussian.of(gappy).covariance)
+    assert abs(fitted - whole) < 0.3 * abs(plain - whole)

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.bench.problem import bench_take, describe
 from facert import Settings, train
 from facert.data import FloatArray
-from facert.methods import Method
+from facert.methods.base import Method
 from facert.threads import threads_for
 
 

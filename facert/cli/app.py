@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 import facert
-from facert.cli import console, convert, demo, inspect, plot, render, retarget, simulate, train
+from facert.cli import (
+    console,
+    convert,
+    demo,
+    evaluate,
+    inspect,
+    plot,
+    render,
+    retarget,
+    simulate,
+    train,
+)
 from facert.errors import FacertError
 
 app = typer.Typer(
@@ -46,6 +57,7 @@ app.command("simulate")(simulate.command)
 app.command("demo")(demo.command)
 app.command("render")(render.command)
 app.command("plot")(plot.command)
+app.command("eval")(evaluate.command)
 
 
 def main() -> None:

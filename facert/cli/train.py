@@ -10,6 +10,7 @@ import typer
 
 from facert.cli import console
 from facert.errors import InputError, OutputExistsError, reading
+from facert.methods import REGISTRY
 from facert.settings import Settings
 
 if TYPE_CHECKING:
@@ -34,9 +35,7 @@ def command(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Model file to write.")
     ] = DEFAULT_MODEL,
-    method: Annotated[
-        str | None, _setting("method", "ssgplvm, or sgplvm: the labelled frames alone.")
-    ] = None,
+    method: Annotated[str | None, _setting("method", "One of " + ", ".join(REGISTRY) + ".")] = None,
     labels: Annotated[
         int | None,
         typer.Option(help="Use only so many of the posed frames, at random.", show_default="all"),
@@ -115,7 +114,7 @@ def command(
     with reading(take or "the built-in take"), ProgressBar() as bar:
         retargeter = facert.train(data, settings, Monitors(*monitors, bar))
     retargeter.save(output, overwrite_model)
-    if retargeter.figures["status"] in ("converged", "stalled"):
+    if retargeter.figures.get("status", "converged") in ("converged", "stalled"):
         checkpoint.remove()
     _print_table(retargeter, output)
 

@@ -4,18 +4,32 @@ To add one, write a file with a class that follows `facert.methods.base.Method` 
 to the registry.
 """
 
-from collections.abc import Callable
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
 
 from facert.errors import InputError
-from facert.methods.base import Method
-from facert.methods.shared_gplvm import SemiSupervisedSGPLVM, SupervisedSGPLVM
 from facert.settings import Settings
 
-__all__ = ["REGISTRY", "Method", "make_method"]
+if TYPE_CHECKING:
+    from facert.methods.base import Method
 
-REGISTRY: dict[str, Callable[[Settings], Method]] = {
-    "ssgplvm": SemiSupervisedSGPLVM,
-    "sgplvm": SupervisedSGPLVM,
+__all__ = ["REGISTRY", "make_method"]
+
+# Name: module and class. A module is loaded with its first method: the libraries behind them take
+# their time, and the names alone are wanted for help.
+REGISTRY = {
+    "ssgplvm": ("shared_gplvm", "SemiSupervisedSGPLVM"),
+    "sgplvm": ("shared_gplvm", "SupervisedSGPLVM"),
+    "gpr": ("gpr", "GPR"),
+    "gpr-linear": ("gpr", "LinearGPR"),
+    "ssgpr": ("semisupervised", "SemiSupervisedGPR"),
+    "svr": ("svr", "SVR"),
+    "ridge": ("linear", "Ridge"),
+    "pls": ("linear", "PLS"),
+    "rbf": ("interpolation", "RBF"),
+    "nearest": ("interpolation", "Nearest"),
 }
 
 
@@ -31,4 +45,6 @@ def make_method(settings: Settings) -> Method:
         raise InputError(
             "method", "one of " + ", ".join(REGISTRY), repr(settings.method), "Choose one of these."
         )
-    return REGISTRY[settings.method](settings)
+    module, name = REGISTRY[settings.method]
+    method: Method = getattr(importlib.import_module(f"facert.methods.{module}"), name)(settings)
+    return method

@@ -42,14 +42,14 @@ class Prediction:
     ----------
     Y : array, shape (T, d_y)
         Poses.
-    std : array, shape (T, d_y)
-        Their predictive standard deviation.
+    std : array, shape (T, d_y), optional
+        Their predictive standard deviation, where the method has one.
     X : array, shape (T, d_x)
         The cleaned source.
     """
 
     Y: FloatArray
-    std: FloatArray
+    std: FloatArray | None
     X: FloatArray
 
 
@@ -59,13 +59,13 @@ class Report:
 
     Parameters
     ----------
-    result : Result
-        Of the optimiser.
+    result : Result, optional
+        Of the optimiser, where the method descends step by step.
     figures : mapping of str to float
         What the method has to say of itself, e.g. kernel parameters.
     """
 
-    result: Result
+    result: Result | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -110,8 +110,9 @@ class Method(Protocol):
 
 def stack_predictions(predictions: list[Prediction]) -> Prediction:
     """One prediction of all frames from one a frame."""
+    stds = [p.std for p in predictions if p.std is not None]
     return Prediction(
         np.concatenate([p.Y for p in predictions]),
-        np.concatenate([p.std for p in predictions]),
+        np.concatenate(stds) if stds else None,
         np.concatenate([p.X for p in predictions]),
     )

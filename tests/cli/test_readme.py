@@ -30,7 +30,7 @@ def test_quick_start_and_python_run_as_printed(facert, tmp_path, monkeypatch):
         assert outcome.code == 0, outcome.err
     exec(use_from_python, {})
 
-    assert len(COMMANDS) == 5
+    assert len(COMMANDS) == 6
     assert (tmp_path / "curves.png").exists()
     assert (tmp_path / "python.h5").exists()
 
@@ -58,3 +58,10 @@ def test_settings_table_shows_the_defaults():
                 continue
             expected = f'"{default}"' if isinstance(default, str) else default
             assert value == expected or float(value) == expected
+
+
+def test_every_method_is_in_the_table():
+    from facert.methods import REGISTRY
+
+    table = README.split("| method | what it learns")[1].split("\n\n")[0]
+    assert re.findall(r"^\| `([\w-]+)` \|", table, re.MULTILINE) == list(REGISTRY)

@@ -1,0 +1,242 @@
+"""``facert eval``: every method on one scale, on a take whose poses are known."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from facert.cli import console
+from facert.errors import InputError, OutputExistsError, reading
+
+if TYPE_CHECKING:
+    from facert.data import Take
+    from facert.evaluation.cells import Outcome
+    from facert.evaluation.protocol import Problem
+    from facert.evaluation.run import Grid
+    from facert.evaluation.summary import Row
+    from facert.io.journal import Journal
+
+BUILT_IN = "the built-in take"
+
+
+class Split(StrEnum):
+    """Which frames are tested."""
+
+    random = "random"
+    block = "block"
+
+
+def command(
+    take: Annotated[
+        Path | None,
+        typer.Argument(help="Take with the true pose in all frames; by default the built-in one."),
+    ] = None,
+    labels: Annotated[
+        str, typer.Option(help="Labelled frames: a..b, a..b:step, or numbers with commas.")
+    ] = "10..40",
+    methods: Annotated[str, typer.Option(help="all, or names with commas.")] = "all",
+    repeats: Annotated[int, typer.Option(min=1, help="Random draws of each.")] = 20,
+    unlabelled: Annotated[
+        str, typer.Option(help="Unlabelled frames, and as many poses: one number, range or list.")
+    ] = "100",
+    noise: Annotated[
+        float, typer.Option(help="Noise, as a share of the largest deviation of a coordinate.")
+    ] = 0.0,
+    missing: Annotated[
+        float, typer.Option(help="Share of the markers to hide in test frames.")
+    ] = 0.0,
+    split: Annotated[
+        Split, typer.Option(help="Test on any other frames, or on other blocks of time.")
+    ] = Split.random,
+    across: Annotated[Path | None, typer.Option(help="Test on this take instead.")] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="The character's rig, for errors of its vertices.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    test_frames: Annotated[
+        int | None, typer.Option(help="Test on so many frames at most.", show_default="all")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="For every random choice.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
+    ] = None,
+    json_path: Annotated[
+        Path | None,
+        typer.Option("--json", help="All figures; an interrupted run continues from beside it."),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Picture of RMS against labels and unlabelled frames.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace existing output files.")
+    ] = False,
+) -> None:
+    """Compare methods: draw labels at random, train, and test on the other frames."""
+    _require_outputs(json_path, plot, overwrite)
+    if across is not None and split is not Split.random:
+        raise typer.BadParameter("--across tests on another take: --split does not apply")
+
+    from facert.cli.evaluation_table import error_table
+    from facert.cli.pictures import save_picture
+    from facert.cli.ranges import parse_range
+    from facert.evaluation.advice import advise
+    from facert.evaluation.figures import plot_errors
+    from facert.evaluation.protocol import Protocol, make_problem
+    from facert.evaluation.run import Grid
+    from facert.evaluation.summary import summarise
+    from facert.io.formats import read_rig_file
+
+    grid = Grid(
+        methods=_methods(methods),
+        labels=parse_range(labels, "--labels"),
+        unlabelled=parse_range(unlabelled, "--unlabelled"),
+        repeats=repeats,
+    )
+    protocol = Protocol(split.value, noise, missing, test_frames, seed)
+    with reading(take or BUILT_IN):
+        problem = make_problem(
+            _read(take, target),
+            protocol,
+            None if across is None else _read(across, target),
+            None if rig is None else read_rig_file(rig, shapes),
+        )
+        journal = _journal(problem, json_path)
+        outcomes = _run(problem, grid, jobs or os.cpu_count() or 1, journal)
+    rows = summarise(outcomes, protocol)
+    title = _title(take, across, problem, grid)
+    console.out.print(error_table(rows, title))
+    if json_path is not None:
+        files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
+        _write_json(json_path, {**_plain(files), **_facts(problem, grid)}, rows, overwrite)
+    if plot is not None and any(row.rms is not None for row in rows):
+        save_picture(plot_errors(rows, title), plot, overwrite)
+    if journal is not None:
+        journal.remove()
+    console.out.print(advise(outcomes), markup=False)
+
+
+def _require_outputs(json_path: Path | None, plot: Path | None, overwrite: bool) -> None:
+    """Refuse names that cannot be written to, before hours of work are done."""
+    from facert.cli.pictures import require_picture_name
+
+    if json_path is not None and json_path.exists() and not overwrite:
+        raise OutputExistsError(json_path)
+    if plot is not None:
+        require_picture_name(plot, overwrite)
+
+
+def _methods(text: str) -> tuple[str, ...]:
+    """The names in the option, each once."""
+    from facert.methods import REGISTRY
+
+    if text == "all":
+        return tuple(REGISTRY)
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    unknown = [name for name in names if name not in REGISTRY]
+    if unknown:
+        expected = "all, or some of " + ", ".join(REGISTRY)
+        raise InputError("--methods", expected, repr(unknown[0]), "Choose others.", "the options")
+    return names
+
+
+def _read(path: Path | None, target: str | None) -> Take:
+    from facert.demo import training_take
+    from facert.io.formats import read_take_file
+
+    return training_take(posed=None) if path is None else read_take_file(path, target=target)
+
+
+def _journal(problem: Problem, json_path: Path | None) -> Journal | None:
+    """Where finished cells are kept: beside the JSON file, if there is to be one."""
+    from facert.evaluation.run import fingerprint
+    from facert.io.journal import Journal
+
+    if json_path is None:
+        return None
+    return Journal(json_path.with_suffix(".cells.jsonl"), fingerprint(problem))
+
+
+def _run(problem: Problem, grid: Grid, jobs: int, journal: Journal | None) -> list[Outcome]:
+    """Evaluate all cells."""
+    from facert.evaluation.run import run
+
+    try:
+        return list(_watched(run(problem, grid, jobs=jobs, journal=journal), len(grid.cells)))
+    except KeyboardInterrupt:
+        if journal is not None:
+            console.log.warning("the same command continues from %s", journal.path)
+        raise
+
+
+def _watched(outcomes: Iterator[Outcome], total: int) -> Iterator[Outcome]:
+    """A bar on a terminal; elsewhere a line for every tenth."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    notes = console.log.isEnabledFor(logging.INFO)
+    terminal = console.err.is_terminal
+    columns = (BarColumn(), MofNCompleteColumn(), "cells", TimeRemainingColumn())
+    bar = Progress(*columns, console=console.err, transient=True, disable=not (terminal and notes))
+    with bar:
+        task = bar.add_task("", total=total)
+        for done, outcome in enumerate(outcomes, start=1):
+            yield outcome
+            bar.advance(task)
+            if not terminal and 10 * done // total > 10 * (done - 1) // total:
+                console.log.info("%d of %d cells", done, total)
+
+
+def _title(take: Path | None, across: Path | None, problem: Problem, grid: Grid) -> str:
+    protocol = problem.protocol
+    where = take.name if take is not None else BUILT_IN
+    tested = f"tested on {across.name}" if across is not None else f"{protocol.split} split"
+    parts = [where, tested, f"{grid.repeats} draws"]
+    if protocol.noise:
+        parts.append(f"noise {protocol.noise:g}")
+    if protocol.missing:
+        parts.append(f"{protocol.missing:.0%} hidden")
+    return ", ".join(parts)
+
+
+def _plain(files: Mapping[str, Path | str | None]) -> dict[str, str | None]:
+    return {name: None if value is None else str(value) for name, value in files.items()}
+
+
+def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
+    """The resolved settings, for the JSON file."""
+    from dataclasses import asdict
+
+    import facert
+    from facert.retargeter import library_versions
+
+    return {
+        **asdict(grid),
+        **asdict(problem.protocol),
+        "split": "across" if problem.across else problem.protocol.split,
+        "frames": len(problem.take),
+        "controls": problem.controls.names,
+        "created_by": f"facert {facert.__version__}",
+        "versions": library_versions(),
+    }
+
+
+def _write_json(path: Path, settings: dict[str, Any], rows: Sequence[Row], overwrite: bool) -> None:
+    import json
+    from dataclasses import asdict
+
+    from facert.io.atomic import replacing
+
+    content = {"settings": settings, "rows": [asdict(row) for row in rows]}
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    with replacing(path, overwrite) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,72 @@
+"""One line that says which method to use for a take, and what more labels would bring."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.evaluation.cells import Outcome
+
+LITTLE = 0.05  # a smaller gain is not worth the work of posing
+RECENT = 3  # numbers of labels that the gain of more is judged by
+LEAST = 1e-12  # an RMS below this is as good as none; its logarithm must be finite
+
+
+def advise(outcomes: Sequence[Outcome]) -> str:
+    """Advice from all outcomes of an evaluation.
+
+    The method is the one with the least geometric mean of the RMS over labels and repeats, with
+    the most unlabelled data, among those that always ran (but for numbers of labels with which
+    none can). Methods are compared on the same draws: another one does as well if its distance
+    over the repeats is within one standard error.
+    """
+    most = max(outcome.cell.unlabelled for outcome in outcomes)
+    outcomes = [outcome for outcome in outcomes if outcome.cell.unlabelled == most]
+    labels = sorted({outcome.cell.labels for outcome in outcomes if outcome.scores is not None})
+    errors = _errors_by_method([o for o in outcomes if o.cell.labels in labels])
+    if not errors:
+        return "No method could run every draw: see the notes below the table."
+    logs = {method: np.log(table).mean(axis=0) for method, table in errors.items()}
+    ranked = sorted(logs, key=lambda method: float(logs[method].mean()))
+    chosen = ranked[0]
+    equals = [other for other in ranked[1:] if _ties(logs[other] - logs[chosen])]
+    as_good = f" ({' and '.join(equals)} within one standard error of it)" if equals else ""
+    return f"Use {chosen} for this take{as_good}. {_about_labels(labels, errors[chosen])}"
+
+
+def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
+    """What more labels would bring, from the RMS at each number of labels, (labels, repeats)."""
+    means = errors.mean(axis=1)
+    seen = f"RMS {means[0]:.3g} with {labels[0]} labels"
+    if len(labels) == 1:
+        return f"{seen}; evaluate a range of labels to see what more would bring."
+    seen += f", {means[-1]:.3g} with {labels[-1]}"
+    slope = np.polyfit(np.log(labels[-RECENT:]), np.log(means[-RECENT:]), 1)[0]
+    gain = 1.0 - 2.0**slope
+    if gain < LITTLE:
+        return f"{seen}; more labels would bring little."
+    return f"{seen}; at this rate {2 * labels[-1]} labels would take off another {gain:.0%}."
+
+
+def _errors_by_method(outcomes: Sequence[Outcome]) -> dict[str, FloatArray]:
+    """RMS (labels, repeats) of each method that ran every cell."""
+    labels = len({outcome.cell.labels for outcome in outcomes})
+    repeats = len({outcome.cell.repeat for outcome in outcomes})
+    found: dict[str, list[float]] = defaultdict(list)
+    for outcome in sorted(outcomes, key=lambda o: (o.cell.labels, o.cell.repeat)):
+        if outcome.scores is not None:
+            found[outcome.cell.method].append(max(outcome.scores.rms, LEAST))
+    return {
+        method: np.array(values).reshape(labels, repeats)
+        for method, values in found.items()
+        if len(values) == labels * repeats
+    }
+
+
+def _ties(behind: FloatArray) -> bool:
+    """Whether a distance, one number a repeat, is within its standard error."""
+    repeats = len(behind)
+    return repeats > 1 and bool(behind.mean() <= behind.std(ddof=1) / repeats**0.5)

@@ -1,0 +1,132 @@
+"""A cell of an evaluation: one method on one draw of the data, and what came of it."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from facert.data import Take
+from facert.errors import FacertError
+from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
+from facert.metrics import Scores, score
+from facert.retargeter import train
+from facert.settings import Settings
+from facert.threads import threads_for
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What is evaluated: a method, the numbers of labels and of unlabelled data, the repeat."""
+
+    method: str
+    labels: int
+    unlabelled: int
+    repeat: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a cell.
+
+    Parameters
+    ----------
+    cell : Cell
+    scores : Scores or None
+        None when the method could not run.
+    fit_seconds : float
+        Training, wall-clock.
+    frame_ms : float
+        Mapping, milliseconds a frame, all frames at once.
+    failure : str
+        Why the method could not run; empty when it did.
+    """
+
+    cell: Cell
+    scores: Scores | None = None
+    fit_seconds: float = 0.0
+    frame_ms: float = 0.0
+    failure: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for a file."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Outcome:
+        """What `as_dict` made.
+
+        Raises
+        ------
+        TypeError, KeyError
+            When the values are of something else.
+        """
+        scores = values["scores"]
+        if scores is not None:
+            scores = Scores(**{**scores, "per_control": tuple(scores["per_control"])})
+        return cls(**{**values, "cell": Cell(**values["cell"]), "scores": scores})
+
+
+def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:
+    """Train and test a method on the draw of its cell, on one thread.
+
+    Parameters
+    ----------
+    problem : Problem
+    cell : Cell
+    settings : Settings
+        Everything about training that the cell does not say.
+    """
+    with threads_for(1), _quiet():
+        try:
+            chosen = draw(problem, cell.labels, cell.unlabelled, cell.repeat)
+            return _evaluate(problem, cell, chosen, cell_settings(problem, cell, settings))
+        except FacertError as error:
+            return Outcome(cell, failure=str(error))
+
+
+def cell_settings(problem: Problem, cell: Cell, settings: Settings) -> Settings:
+    """The settings with which a cell is trained: all labels and unlabelled data of its draw."""
+    return replace(
+        settings,
+        method=cell.method,
+        labels=None,
+        unlabelled=cell.unlabelled,
+        seed=problem.protocol.seed + cell.repeat,
+    )
+
+
+def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) -> Outcome:
+    training = training_take(problem, chosen, cell.repeat)
+    frames = held_out_take(problem, chosen, cell.repeat)
+    began = time.perf_counter()
+    retargeter = train(training, settings)
+    trained = time.perf_counter()
+    result: Take = retargeter.retarget(frames)
+    ended = time.perf_counter()
+    assert result.params is not None  # retarget poses every frame
+    errors = result.params - true_poses(problem, chosen)
+    if not np.isfinite(errors).all():
+        return Outcome(cell, failure="poses that are not finite")
+    return Outcome(
+        cell,
+        score(errors, chosen.test, problem.ranges, problem.gram),
+        fit_seconds=trained - began,
+        frame_ms=1e3 * (ended - trained) / len(frames),
+    )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Nothing in the log: what training has to say, it would say hundreds of times."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(before)

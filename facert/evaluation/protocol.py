@@ -1,0 +1,306 @@
+"""Few-shot problems out of a take whose poses are known, as in section 3 of the paper.
+
+Each repeat draws a few labelled frames, unlabelled frames and unlabelled poses at random, and
+tests on other frames. A draw depends on the seed, the repeat and the numbers alone, so that all
+methods meet the same data. The draws of one repeat are nested: 20 labels are 10 labels and 10 more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from facert.data import BoolArray, Controls, FloatArray, IntArray, Rig, Take
+from facert.errors import InputError, reading
+from facert.metrics import vertex_gram
+from facert.names import match
+from facert.normalisation import Normalisation
+from facert.training_set import MIN_OBSERVED
+
+Split = Literal["random", "block"]
+
+BLOCKS = 10
+# A capped test set is made of stretches of so many frames, or jitter could not be measured.
+STRETCH = 25
+# What a random stream is for; part of its seed.
+_FRAMES, _ANIMATION, _NOISE, _GAPS, _TEST = range(5)
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How the data of a repeat is drawn.
+
+    Parameters
+    ----------
+    split : {"random", "block"}
+        Test frames are any others, or those of other time blocks: the take is cut into ten, every
+        other block is for training, and the two halves change places from repeat to repeat.
+    noise : float
+        Standard deviation of the Gaussian noise on all frames, as a share of the largest standard
+        deviation of a source coordinate.
+    missing : float
+        Share of the (frame, marker) entries that are hidden in test frames, 0 up to below 1.
+    test_frames : int, optional
+        Test on so many frames at most; by default on all the others.
+    seed : int
+    """
+
+    split: Split = "random"
+    noise: float = 0.0
+    missing: float = 0.0
+    test_frames: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _check(self.split in get_args(Split), "split", "random or block", self.split)
+        _check(self.noise >= 0, "noise", "0 or more", self.noise)
+        _check(0 <= self.missing < 1, "missing", "a share from 0 to below 1", self.missing)
+        _check(self.seed >= 0, "seed", "0 or more", self.seed)
+        if self.test_frames is not None:
+            _check(self.test_frames >= 1, "test_frames", "1 or more", self.test_frames)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A take with known poses, and how methods are tried on it; made by `make_problem`.
+
+    Parameters
+    ----------
+    take : Take
+        Training data is drawn from it. Where it has an animation, that is the unlabelled target;
+        else poses of its frames are.
+    test : Take
+        Test frames are drawn from it: `take` itself, or another one with the same controls.
+    protocol : Protocol
+    gram : array, shape (P, P), optional
+        The rig's, for errors of vertices.
+    """
+
+    take: Take
+    test: Take
+    protocol: Protocol
+    gram: FloatArray | None = None
+
+    @property
+    def across(self) -> bool:
+        """Whether the test is on another take."""
+        return self.test is not self.take
+
+    @property
+    def controls(self) -> Controls:
+        """The character's."""
+        assert self.take.controls is not None  # make_problem
+        return self.take.controls
+
+    @property
+    def ranges(self) -> FloatArray:
+        """Range of each control over the known poses of the test take, (P,)."""
+        return np.asarray(np.ptp(_poses(self.test)[self.test.labels], axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """Which data one repeat uses; indices rise.
+
+    Parameters
+    ----------
+    labelled, unlabelled : arrays of int
+        Frames of the take.
+    poses : array of int
+        Rows of the take's animation where it has one, else frames of the take.
+    test : array of int
+        Frames of the test take.
+    """
+
+    labelled: IntArray
+    unlabelled: IntArray
+    poses: IntArray
+    test: IntArray
+
+
+def make_problem(
+    take: Take, protocol: Protocol, across: Take | None = None, rig: Rig | None = None
+) -> Problem:
+    """Check that takes and rig fit together.
+
+    Parameters
+    ----------
+    take : Take
+        With known poses, best in every frame.
+    protocol : Protocol
+    across : Take, optional
+        Test on this one instead: the same controls, in any order.
+    rig : Rig, optional
+        With a shape for every control.
+
+    Raises
+    ------
+    InputError
+        When a take has no poses, or names are absent.
+    """
+    _check_posed(take)
+    assert take.controls is not None  # poses come with controls
+    test, gram = take, None
+    if across is not None:
+        with reading("the take to test on"):
+            _check_posed(across)
+            test = _with_controls(across, take.controls)
+    if rig is not None:
+        with reading("the rig"):
+            gram = vertex_gram(rig, take.controls)
+    return Problem(take, test, protocol, gram)
+
+
+def draw(problem: Problem, labels: int, unlabelled: int, repeat: int) -> Draw:
+    """The frames and poses of a repeat.
+
+    Labels come from the front of one random order, unlabelled frames and poses from its back, so
+    that each set holds the smaller one. Frames without a known pose serve as unlabelled first.
+
+    Raises
+    ------
+    InputError
+        When the take is too short.
+    """
+    pool, candidates = _pools(problem, repeat)
+    order = _rng(problem, repeat, _FRAMES).permutation(pool)
+    is_posed = np.isin(order, problem.take.labels)
+    posed, unposed = order[is_posed], order[~is_posed]
+    labelled, back = posed[:labels], posed[::-1]
+    animation = problem.take.animation
+    if animation is None:
+        frames, poses = _deal(unposed, back, unlabelled)
+        used = np.concatenate([labelled, frames, poses])
+    else:
+        frames = np.concatenate([unposed, back])[:unlabelled]
+        poses = _rng(problem, repeat, _ANIMATION).permutation(len(animation))[:unlabelled]
+        used = np.concatenate([labelled, frames])
+    if not problem.across:
+        candidates = np.setdiff1d(candidates, used)
+    test = _capped(problem, candidates, repeat)
+    if len(labelled) < labels or len(np.unique(used)) < len(used) or not len(test):
+        raise _too_short()
+    return Draw(np.sort(labelled), np.sort(frames), np.sort(poses), test)
+
+
+def training_take(problem: Problem, chosen: Draw, repeat: int) -> Take:
+    """What a method may see: the labelled and the unlabelled frames, with noise, and the poses."""
+    take, rows = problem.take, np.union1d(chosen.labelled, chosen.unlabelled)
+    params = np.where(np.isin(rows, chosen.labelled)[:, None], _poses(take)[rows], np.nan)
+    pool = _poses(take) if take.animation is None else take.animation
+    source = take.source.matrix[rows] + _noise(problem, take, repeat)[rows]
+    return replace(
+        take,
+        time=take.time[rows],
+        source=take.source.with_matrix(source),
+        params=params,
+        std=None,
+        animation=pool[chosen.poses] if len(chosen.poses) else None,
+    )
+
+
+def held_out_take(problem: Problem, chosen: Draw, repeat: int) -> Take:
+    """The test frames, with noise and gaps and without poses."""
+    take, rows = problem.test, chosen.test
+    source = take.source.matrix[rows] + _noise(problem, take, repeat)[rows]
+    shape = take.source.values.shape[:2]
+    hidden = _rng(problem, repeat, _GAPS).random(shape)[rows] < problem.protocol.missing
+    source[np.repeat(hidden, source.shape[1] // shape[1], axis=1)] = np.nan
+    return replace(
+        take,
+        time=take.time[rows],
+        source=take.source.with_matrix(source),
+        params=None,
+        std=None,
+        animation=None,
+    )
+
+
+def true_poses(problem: Problem, chosen: Draw) -> FloatArray:
+    """The known poses of the test frames, (n, P)."""
+    return _poses(problem.test)[chosen.test]
+
+
+def _pools(problem: Problem, repeat: int) -> tuple[IntArray, IntArray]:
+    """The frames to draw training data from, and those to test on."""
+    trained = np.flatnonzero(_observed(problem.take))
+    if problem.across:
+        tested = np.flatnonzero(_observed(problem.test))
+    elif problem.protocol.split == "block":
+        own = (trained * BLOCKS // len(problem.take) + repeat) % 2 == 0
+        trained, tested = trained[own], trained[~own]
+    else:
+        tested = trained
+    return trained, np.intersect1d(tested, problem.test.labels)
+
+
+def _deal(unposed: IntArray, posed: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """Unlabelled frames and unlabelled poses in turn from the posed frames, unposed ones first."""
+    first, rest = np.split(posed, [min(len(unposed), len(posed))])
+    frames, poses = np.concatenate([unposed, rest[0::2]]), np.concatenate([first, rest[1::2]])
+    return frames[:count], poses[:count]
+
+
+def _observed(take: Take) -> BoolArray:
+    """The frames that show enough of the source to be of use, (T,)."""
+    return np.asarray(take.source.valid.mean(axis=1) >= MIN_OBSERVED)
+
+
+def _capped(problem: Problem, candidates: IntArray, repeat: int) -> IntArray:
+    """All the candidates, or as many as the protocol allows, in stretches."""
+    most = problem.protocol.test_frames
+    if most is None or most >= len(candidates):
+        return candidates
+    starts = _rng(problem, repeat, _TEST).permutation(np.arange(0, len(candidates), STRETCH))
+    stretches = [candidates[start : start + STRETCH] for start in starts[: most // STRETCH + 2]]
+    return np.sort(np.concatenate(stretches)[:most])
+
+
+def _noise(problem: Problem, take: Take, repeat: int) -> FloatArray:
+    """Noise for every frame of one of the takes, (T, D)."""
+    known = problem.take.source.matrix
+    known = known[:, ~np.isnan(known).all(axis=0)]
+    std = problem.protocol.noise * Normalisation.of(known, "/source").scale
+    rng = _rng(problem, repeat, _NOISE, int(take is not problem.take))
+    return std * rng.standard_normal(take.source.matrix.shape)
+
+
+def _rng(problem: Problem, repeat: int, *purpose: int) -> np.random.Generator:
+    return np.random.default_rng([problem.protocol.seed, repeat, *purpose])
+
+
+def _with_controls(take: Take, controls: Controls) -> Take:
+    """A take with its poses in the order of the controls."""
+    assert take.controls is not None  # poses come with controls
+    columns = match(controls.names, take.controls.names, "/target/names")
+    return replace(
+        take, controls=controls, params=_poses(take)[:, columns], std=None, animation=None
+    )
+
+
+def _poses(take: Take) -> FloatArray:
+    assert take.params is not None  # make_problem
+    return take.params
+
+
+def _check_posed(take: Take) -> None:
+    if not len(take.labels):
+        raise InputError(
+            "/target/params", "known poses", "none", "Evaluate on a take with the true poses."
+        )
+
+
+def _too_short() -> InputError:
+    return InputError(
+        "/target/params",
+        "enough posed frames for labels, unlabelled frames and poses, and a test",
+        "too few",
+        "Ask for fewer labels or fewer unlabelled frames, or give a longer take.",
+    )
+
+
+def _check(good: bool, option: str, expected: str, found: object) -> None:
+    if not good:
+        raise InputError(option, expected, repr(found), "Choose another value.", "the options")

@@ -1,0 +1,85 @@
+"""A journal of finished work: one JSON object a line, kept so that an interrupted run continues."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from facert.errors import InputError, reading
+from facert.io.text import read_text
+
+log = logging.getLogger(__name__)
+
+
+class Journal:
+    """A file to which finished work is added line by line.
+
+    Its first line tells which work it belongs to. A journal of other work is begun anew; a last
+    line that was cut off is passed over.
+
+    Parameters
+    ----------
+    path : Path
+        The file. Nothing is written before `begin`.
+    fingerprint : str
+        Of the work: what must be the same for its entries to be of use.
+    """
+
+    def __init__(self, path: Path, fingerprint: str) -> None:
+        self.path, self._fingerprint = path, fingerprint
+
+    def begin(self) -> list[dict[str, Any]]:
+        """The entries that are there, of the same work; the file is ready for more.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be read or written.
+        """
+        entries = self._entries()
+        header = {"fingerprint": self._fingerprint}
+        text = "".join(json.dumps(line) + "\n" for line in (header, *entries))
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(
+                "journal",
+                "a file that can be written",
+                str(error),
+                "Choose another place.",
+                str(self.path),
+            ) from error
+        return entries
+
+    def add(self, entry: Mapping[str, Any]) -> None:
+        """Write one more entry."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry, allow_nan=False) + "\n")
+
+    def remove(self) -> None:
+        """Delete the file: the work is complete."""
+        self.path.unlink(missing_ok=True)
+
+    def _entries(self) -> list[dict[str, Any]]:
+        if not self.path.exists():
+            return []
+        with reading(self.path):
+            lines = read_text(self.path).splitlines()
+        header, *entries = [_parse(line) for line in lines] or [None]
+        if header != {"fingerprint": self._fingerprint}:
+            log.warning("%s is of other work: begun anew", self.path)
+            return []
+        return [entry for entry in entries if entry is not None]
+
+
+def _parse(line: str) -> dict[str, Any] | None:
+    """The object in a line; None for anything else."""
+    try:
+        value = json.loads(line)
+    except ValueError:
+        return None
+    return value if isinstance(value, dict) else None

@@ -1,0 +1,89 @@
+"""What engines' pose drivers do: interpolate between poses (`rbf`), or take one (`nearest`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial.distance import cdist
+
+from facert.data import FloatArray
+from facert.methods.regression import Map, SupervisedRegression
+
+# Enough to tell a frame that was posed twice, differently, from a contradiction.
+SMOOTHING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolatingMap(Map):
+    """Radial basis functions |x - x_i| around the posed frames, and a constant.
+
+    Parameters
+    ----------
+    X, Y : arrays, shapes (n, d_x) and (n, d_y)
+        Posed frames.
+    smoothing : array, shape (1,)
+        How far from going through the poses exactly, in normalised units of length.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "smoothing": "1"}
+
+    X: FloatArray
+    Y: FloatArray
+    smoothing: FloatArray
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
+        """Poses of frames X (T, d_x), (T, d_y)."""
+        return self._interpolator(X), None
+
+    @cached_property
+    def _interpolator(self) -> RBFInterpolator:
+        return RBFInterpolator(
+            self.X, self.Y, kernel="linear", degree=0, smoothing=self.smoothing.item()
+        )
+
+
+class RBF(SupervisedRegression):
+    """Radial basis function interpolation with the linear kernel.
+
+    Of the standard kernels the linear one suits few examples in many dimensions: it needs no
+    length, and does not overshoot between them as thin plates and cubics do.
+    """
+
+    map_type = InterpolatingMap
+
+    def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[InterpolatingMap, dict[str, float]]:
+        return InterpolatingMap(X, Y, np.array([SMOOTHING])), {}
+
+
+@dataclass(frozen=True, eq=False)
+class NearestMap(Map):
+    """The pose of the most similar frame.
+
+    Parameters
+    ----------
+    X, Y : arrays, shapes (n, d_x) and (n, d_y)
+        Posed frames.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny"}
+
+    X: FloatArray
+    Y: FloatArray
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
+        """Poses of frames X (T, d_x), (T, d_y)."""
+        return self.Y[cdist(X, self.X, "sqeuclidean").argmin(axis=1)], None
+
+
+class Nearest(SupervisedRegression):
+    """The pose of the posed frame that is nearest."""
+
+    map_type = NearestMap
+
+    def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[NearestMap, dict[str, float]]:
+        return NearestMap(X, Y), {}

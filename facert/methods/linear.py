@@ -1,0 +1,98 @@
+"""Linear regression, two ways to keep it from following the noise: `ridge` and `pls`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from sklearn.cross_decomposition import PLSRegression
+from sklearn.linear_model import RidgeCV
+
+from facert.data import FloatArray
+from facert.methods.folds import blocked_folds
+from facert.methods.regression import Map, SupervisedRegression
+
+# Penalties relative to the mean sum of squares of a frame.
+PENALTIES = np.logspace(-7, 2, 46)
+MAX_COMPONENTS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMap(Map):
+    """Y = X W + b.
+
+    Parameters
+    ----------
+    weights : array, shape (d_x, d_y)
+        W.
+    offset : array, shape (d_y,)
+        b.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"weights": "xy", "offset": "y"}
+
+    weights: FloatArray
+    offset: FloatArray
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
+        """Poses of frames X (T, d_x), (T, d_y)."""
+        return X @ self.weights + self.offset, None
+
+
+class Ridge(SupervisedRegression):
+    """Ridge regression, the penalty of each control chosen by leave-one-out error in closed form.
+
+    There is no free offset: what the labels do not tell falls back on the mean of all known poses.
+    """
+
+    map_type = LinearMap
+
+    def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[LinearMap, dict[str, float]]:
+        penalties = PENALTIES * max(np.sum(X * X) / len(X), np.finfo(np.float64).tiny)
+        found = RidgeCV(penalties, fit_intercept=False, alpha_per_target=True).fit(X, Y)
+        # scikit-learn drops the axis of a single control.
+        weights = found.coef_.reshape(Y.shape[1], X.shape[1]).T.copy()
+        figures = {"median penalty": float(np.median(found.alpha_))}
+        return LinearMap(weights, np.zeros(Y.shape[1])), figures
+
+
+class PLS(SupervisedRegression):
+    """Partial least squares, the number of components chosen by blocked cross-validation."""
+
+    map_type = LinearMap
+
+    def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[LinearMap, dict[str, float]]:
+        folds = blocked_folds(len(X))
+        # The smallest fold decides; centring takes one more.
+        most = min(MAX_COMPONENTS, X.shape[1], *(len(train) - 1 for train, _ in folds))
+        errors = sum(
+            np.sum((_poses_by_components(X[train], Y[train], X[test], most) - Y[test]) ** 2, (1, 2))
+            for train, test in folds
+        )
+        components = int(np.argmin(errors)) + 1
+        found = _components(X, Y, components)
+        weights = found.coef_.T.copy()
+        offset = found.intercept_ - X.mean(axis=0) @ weights
+        return LinearMap(weights, offset), {"components": components}
+
+
+def _poses_by_components(X: FloatArray, Y: FloatArray, frames: FloatArray, most: int) -> FloatArray:
+    """What 1 to `most` components say about frames (T, d_x), (most, T, d_y).
+
+    Components are found one after the other: each model is the next with its last term left off.
+    """
+    model = _components(X, Y, most)
+    scores = (frames - X.mean(axis=0)) @ model.x_rotations_
+    terms = scores.T[:, :, None] * model.y_loadings_.T[:, None, :]
+    poses: FloatArray = Y.mean(axis=0) + np.cumsum(terms, axis=0)
+    return poses
+
+
+def _components(X: FloatArray, Y: FloatArray, count: int) -> PLSRegression:
+    with warnings.catch_warnings():
+        # Where fewer components explain everything the others are zero, which does no harm.
+        warnings.filterwarnings("ignore", "y residual is constant", UserWarning)
+        return PLSRegression(count, scale=False).fit(X, Y)

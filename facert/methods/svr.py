@@ -1,0 +1,126 @@
+"""Support vector regression, a machine for each control (Drucker et al. 1997)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+import sklearn
+from scipy.spatial.distance import cdist
+from sklearn import svm
+
+from facert.data import FloatArray, IntArray
+from facert.methods.folds import blocked_folds
+from facert.methods.regression import Map, SupervisedRegression
+
+# The inverse width is relative to the mean squared distance of two labels; ε and C to the standard
+# deviation of a control.
+INVERSE_WIDTHS = (0.01, 0.05, 0.25)
+PENALTIES = (1.0, 30.0, 1000.0)
+TUBES = (0.02, 0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class PackedMap(Map):
+    """All machines in one matrix: a frame costs one product, whatever the number of controls.
+
+    Parameters
+    ----------
+    X : array, shape (n, d_x)
+        Posed frames.
+    inverse_widths : array, shape (g,)
+        γ of the kernels exp(-γ |x - x'|²) that the machines use.
+    duals : array, shape (g, n, d_y)
+        Weight of each kernel at each posed frame in each control; 0 where it is not used.
+    offset : array, shape (d_y,)
+        Added to the sum.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {
+        "X": "nx",
+        "inverse_widths": "g",
+        "duals": "gny",
+        "offset": "y",
+    }
+
+    X: FloatArray
+    inverse_widths: FloatArray
+    duals: FloatArray
+    offset: FloatArray
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
+        """Poses of frames X (T, d_x), (T, d_y)."""
+        squared = cdist(X, self.X, "sqeuclidean")
+        k = np.exp(-self.inverse_widths[:, None] * squared[:, None, :])
+        packed = self.duals.reshape(-1, self.duals.shape[2])
+        return k.reshape(len(X), len(packed)) @ packed + self.offset, None
+
+
+class _Choice(NamedTuple):
+    """Index of the kernel, C and ε."""
+
+    width: int
+    penalty: float
+    tube: float
+
+
+CHOICES = [_Choice(*c) for c in product(range(len(INVERSE_WIDTHS)), PENALTIES, TUBES)]
+
+
+class _Machine(NamedTuple):
+    """Weights of the training rows, (n,), and what is added."""
+
+    duals: FloatArray
+    offset: float
+
+
+class SVR(SupervisedRegression):
+    """Support vector regression; width, C and ε of each control chosen by cross-validation."""
+
+    map_type = PackedMap
+
+    def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[PackedMap, dict[str, float]]:
+        squared = cdist(X, X, "sqeuclidean")
+        # Labels that are all the same have no width of their own.
+        inverse_widths = np.array(INVERSE_WIDTHS) / (float(squared.mean()) or 1.0)
+        kernels = np.exp(-inverse_widths[:, None, None] * squared)
+        mean, scale = Y.mean(axis=0), Y.std(axis=0)
+        scale = np.where(scale > 0, scale, 1.0)  # a control that never moves
+        T = (Y - mean) / scale
+
+        duals, offset = np.zeros((len(kernels), *Y.shape)), np.empty(Y.shape[1])
+        with sklearn.config_context(assume_finite=True, skip_parameter_validation=True):
+            for control, index in enumerate(_errors(kernels, T).argmin(axis=0)):
+                choice = CHOICES[index]
+                machine = _train(kernels[choice.width], T[:, control], choice)
+                duals[choice.width, :, control], offset[control] = machine
+        return PackedMap(X, inverse_widths, duals * scale, offset * scale + mean), {}
+
+
+def _errors(kernels: FloatArray, T: FloatArray) -> FloatArray:
+    """Squared error of every choice for every control over held-out blocks, (choices, d_y)."""
+    errors = np.zeros((len(CHOICES), T.shape[1]))
+    folds = blocked_folds(len(T))
+    for (row, choice), fold, control in product(enumerate(CHOICES), folds, range(T.shape[1])):
+        errors[row, control] += _held_out(kernels[choice.width], T[:, control], choice, *fold)
+    return errors
+
+
+def _held_out(
+    K: FloatArray, t: FloatArray, choice: _Choice, train: IntArray, test: IntArray
+) -> float:
+    """Squared error on the test rows of a machine trained on the others."""
+    machine = _train(K[np.ix_(train, train)], t[train], choice)
+    guess = K[np.ix_(test, train)] @ machine.duals + machine.offset
+    return float(np.sum((guess - t[test]) ** 2))
+
+
+def _train(K: FloatArray, t: FloatArray, choice: _Choice) -> _Machine:
+    """A machine for one control from its kernel (n, n) and standardised values (n,)."""
+    found = svm.SVR(kernel="precomputed", C=choice.penalty, epsilon=choice.tube).fit(K, t)
+    duals = np.zeros(len(t))
+    duals[found.support_] = found.dual_coef_[0]
+    return _Machine(duals, float(found.intercept_[0]))

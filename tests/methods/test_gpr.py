@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
+
+from facert.errors import InputError
+from facert.methods import make_method
+from facert.methods.base import Labelled, Unlabelled
+from facert.methods.gpr import ProcessMap
+from facert.settings import Settings
+
+
+def frames_and_poses(n=20, noise=0.05, seed=0):
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(n, 6))
+    return X, np.sin(X @ rng.normal(size=(6, 3)) / 2.0) + noise * rng.normal(size=(n, 3))
+
+
+@pytest.mark.parametrize("theta", [(1.5, 0.3, 50.0, 0.0), (0.5, 2.0, 1e4, 0.2)])
+def test_predictions_equal_scikit_learns_at_equal_hyperparameters(theta):
+    X, Y = frames_and_poses()
+    frames = np.random.default_rng(1).normal(size=(40, 6))
+    theta1, theta2, theta3, theta4 = theta
+    kernel = ConstantKernel(theta1) * RBF(theta2**-0.5) + WhiteKernel(1.0 / theta3)
+    if theta4:
+        kernel += ConstantKernel(theta4) * DotProduct(0.0, "fixed")
+    theirs = GaussianProcessRegressor(kernel, optimizer=None, alpha=0.0).fit(X, Y)
+    expected_mean, expected_std = theirs.predict(frames, return_std=True)
+
+    mean, std = ProcessMap(X, Y, np.array(theta))(frames)
+    np.testing.assert_allclose(mean, expected_mean, atol=1e-8)
+    np.testing.assert_allclose(std, expected_std, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["gpr", "gpr-linear"])
+def test_far_from_the_labels_the_std_grows(name):
+    X, Y = frames_and_poses()
+    method = make_method(Settings(method=name))
+    method.fit(Labelled(X, Y), Unlabelled(X[:0], Y[:0]))
+    near, far = method.predict(X), method.predict(10.0 * X)
+    assert (far.std > near.std).all()
+    assert near.std.shape == Y.shape
+
+
+@pytest.mark.parametrize("theta", [(1.0, 0.0, 1.0, 0.0), (1.0, 1.0, 0.0, 0.0), (1, 1, 1, -1)])
+def test_kernel_parameters_that_make_no_kernel_are_refused(theta):
+    X, Y = frames_and_poses()
+    with pytest.raises(InputError, match="theta: expected positive numbers"):
+        ProcessMap(X, Y, np.array(theta, dtype=float))
+
+
+def test_left_out_errors_are_those_of_leaving_labels_out():
+    X, Y = frames_and_poses()
+    theta = np.array([0.5, 2.0, 50.0, 0.2])
+    errors = ProcessMap(X, Y, theta).left_out_errors
+    for left_out in range(len(X)):
+        others = np.arange(len(X)) != left_out
+        mean, _ = ProcessMap(X[others], Y[others], theta)(X[left_out : left_out + 1])
+        np.testing.assert_allclose(errors[left_out], Y[left_out] - mean[0], atol=1e-10)
