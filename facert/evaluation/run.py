@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from itertools import product
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import active_children, connection, get_context, parent_process
 from threading import Thread
 
 import numpy as np
@@ -134,14 +134,20 @@ def _in_processes(
     problem: Problem, cells: Sequence[Cell], settings: Settings, jobs: int
 ) -> Iterator[Outcome]:
     # Spawned: a fork would copy torch's thread pools in whatever state they are.
+    strangers = set(active_children())
     pool = ProcessPoolExecutor(
         min(jobs, len(cells)), get_context("spawn"), _begin_process, (problem, settings)
     )
     try:
         for future in as_completed([pool.submit(_evaluate_shared, cell) for cell in cells]):
             yield future.result()
+    except BaseException:
+        # Not asked to end but ended: a second Ctrl-C while they finish would leave them hanging.
+        for process in set(active_children()) - strangers:
+            process.terminate()
+        raise
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown()
 
 
 def _begin_process(problem: Problem, settings: Settings) -> None:

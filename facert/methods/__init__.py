@@ -24,6 +24,7 @@ REGISTRY = {
     "sgplvm": ("shared_gplvm", "SupervisedSGPLVM"),
     "gpr": ("gpr", "GPR"),
     "gpr-linear": ("gpr", "LinearGPR"),
+    "auto": ("auto", "Auto"),
     "ssgpr": ("semisupervised", "SemiSupervisedGPR"),
     "svr": ("svr", "SVR"),
     "ridge": ("linear", "Ridge"),

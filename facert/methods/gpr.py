@@ -68,7 +68,7 @@ class ProcessMap(Map):
 
     @property
     def left_out_errors(self) -> FloatArray:
-        """What would be missed of each pose if it alone were left out, (n, d_y).
+        """Each pose less what would be said of it if it alone were left out, (n, d_y).
 
         (K⁻¹Y)_i / (K⁻¹)_ii: Rasmussen and Williams (2006), Eq. (5.12).
         """
