@@ -180,12 +180,12 @@ def _normal(shape: tuple[int, ...], seed: np.random.SeedSequence) -> FloatArray:
 
 
 def _checked_vertices(rig: Rig, vertices: ArrayLike) -> IntArray:
-    chosen = np.atleast_1d(np.asarray(vertices, dtype=np.int64))
+    chosen = np.atleast_1d(np.asarray(vertices))  # checked before int64: it may not fit
     inside = ((chosen >= 0) & (chosen < len(rig.neutral))).all()
     different = len(np.unique(chosen)) == len(chosen)
     expected = f"different vertices from 0 to {len(rig.neutral) - 1}"
     _check(bool(inside and different and len(chosen)), "--vertices", expected, chosen.tolist())
-    return chosen
+    return chosen.astype(np.int64)
 
 
 def _check(good: bool, option: str, expected: str, found: object) -> None:

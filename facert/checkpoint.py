@@ -12,9 +12,9 @@ import numpy as np
 import facert
 from facert.data import FloatArray
 from facert.errors import InputError, OutputExistsError
-from facert.gplvm.training import Monitor, Progress
 from facert.io.tensors import read_tensors, write_tensors
 from facert.optim.base import State
+from facert.optim.monitor import Monitor, Progress
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +42,7 @@ class CheckpointFile(Monitor):
         if path.exists() and not resume:
             log.warning("%s is of an earlier run and will be replaced; --resume continues it", path)
         self.path, self._resume = path, resume
+        self.continues = resume and path.exists()
         self._fingerprint = ""
 
     def resume(self, fingerprint: str) -> Progress | None:
@@ -98,21 +99,28 @@ class CurveLog(Monitor):
     ----------
     path : Path
         The file.
+    overwrite : bool
+        Begin an existing file anew.
+    goes_on : bool
+        Add to an existing file: the run continues another.
 
     Raises
     ------
     OutputExistsError
-        When it exists and `overwrite` is false.
+        When the file exists and neither is set.
     """
 
-    def __init__(self, path: Path, overwrite: bool) -> None:
-        if path.exists() and not overwrite:
+    def __init__(self, path: Path, overwrite: bool, goes_on: bool = False) -> None:
+        if path.exists() and not (overwrite or goes_on):
             raise OutputExistsError(path)
         self.path = path
+        self._goes_on = goes_on and path.exists()
         self._began = time.perf_counter()
 
     def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  only begins the file
         """Begin the file: training is about to start."""
+        if self._goes_on:
+            return None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.path.write_text("iteration,objective,gradient_norm,seconds\n", encoding="utf-8")

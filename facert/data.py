@@ -7,6 +7,8 @@ made read-only, so that a take can be shared without fear.
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeVar
@@ -22,6 +24,9 @@ IntArray = NDArray[np.int64]
 
 SourceKind = Literal["markers", "weights"]
 _Scalar = TypeVar("_Scalar", bound=np.generic)
+
+# HDF5 cannot hold NUL, UTF-8 no half of a pair; control characters and line ends upset a terminal.
+_FORBIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +190,8 @@ class Take:
             )
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise InputError("fps", "a positive number", f"{self.fps}", "Set the frame rate.")
+        for name in ("units", "start_timecode", "up_axis", "created_by"):
+            _require_plain(getattr(self, name), f"attribute {name}")
         _set(self, time=_frozen(time))
         for name, rows in (("params", frames), ("std", frames), ("animation", None)):
             _set(self, **{name: self._poses(name, rows)})
@@ -276,6 +283,7 @@ class Rig:
                 "/neutral, /shapes", "finite numbers", "NaN or infinity", "Check the export."
             )
         names = _names(self.names, len(shapes), "/names")
+        _require_plain(self.units, "attribute units")
         faces = np.asarray(self.faces)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
             raise InputError(
@@ -338,12 +346,22 @@ def _float_array(value: ArrayLike, path: str) -> FloatArray:
 
 
 def _names(names: Sequence[str], count: int, path: str) -> tuple[str, ...]:
-    """Check that there is one name a column, none empty and none twice."""
+    """Check that there is one name a column, each plain text, none empty and none twice."""
     names = tuple(str(name) for name in names)
     if len(names) != count or not names:
         raise InputError(path, f"{count} names", f"{len(names)}", "Give one name a column.")
-    doubled = sorted({name for name in names if names.count(name) > 1})
+    doubled = [name for name, count in Counter(names).items() if count > 1]
     if doubled or "" in names:
         found = f"{doubled[0]!r} twice" if doubled else "an empty name"
         raise InputError(path, "names that are all different", found, "Rename one of them.")
+    for name in names:
+        _require_plain(name, path)
     return names
+
+
+def _require_plain(text: str, path: str) -> None:
+    """Refuse text that no file can hold, or that could upset a terminal."""
+    if _FORBIDDEN.search(text):
+        raise InputError(
+            path, "text without control characters", repr(text[:60]), "Write plain text."
+        )

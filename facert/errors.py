@@ -10,6 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+MOST = 120
+"""Most characters of what an `InputError` says of a field, or of what was expected or found."""
+
 
 class FacertError(Exception):
     """Parent of every error that facert raises on purpose."""
@@ -44,8 +47,19 @@ class InputError(FacertError):
     def __str__(self) -> str:
         """One line: ``where: field: expected ..., found .... Fix.``."""
         where = f"{self.where}: " if self.where else ""
-        line = f"{where}{self.field}: expected {self.expected}, found {self.found}. {self.fix}"
-        return " ".join(line.split())
+        field, expected, found = map(_shortened, (self.field, self.expected, self.found))
+        fix = _shortened(self.fix, 10 * MOST)  # it may list what there is
+        line = f"{where}{field}: expected {expected}, found {found}. {fix}"
+        return _printable(" ".join(line.split()))
+
+
+def _shortened(text: str, most: int = MOST) -> str:
+    return text if len(text) <= most else f"{text[:most]}[...]"
+
+
+def _printable(text: str) -> str:
+    """The text with escapes for what would upset a terminal."""
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
 
 
 class OutputExistsError(FacertError):

@@ -25,13 +25,18 @@ class Gap:
 
 @dataclass(frozen=True)
 class SourceSummary:
-    """The source of a take; a constant channel never varies."""
+    """The source of a take; a constant channel never varies.
+
+    `zeros` counts marker positions that are exactly (0, 0, 0), which is how some programs write a
+    lost marker; None when there are none.
+    """
 
     kind: str
     names: tuple[str, ...]
     active: int
     constant: tuple[str, ...]
     missing: float
+    zeros: int | None
     worst: tuple[Gap, ...]
 
 
@@ -117,8 +122,16 @@ def _summarise_source(source: Source) -> SourceSummary:
         active=int(active.sum()),
         constant=_pick(source.names, ~active),
         missing=float(missing.mean()),
+        zeros=_count_zeros(source),
         worst=tuple(Gap(source.names[index], float(missing[index])) for index in worst),
     )
+
+
+def _count_zeros(source: Source) -> int | None:
+    """Marker positions at the origin, or None when there are none."""
+    if source.kind != "markers":
+        return None
+    return int((source.values == 0).all(axis=2).sum()) or None
 
 
 def _summarise_target(take: Take) -> TargetSummary | None:

@@ -42,7 +42,8 @@ ARKIT_ANGLES = tuple(_ANGLES.split())
 ARKIT_NAMES = ARKIT_SHAPES + ARKIT_ANGLES
 
 _SIDES = {"l": "left", "r": "right"}
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[-+]?\d+|[^\W\d_a-zA-Z]+")
+_BETWEEN_NUMBERS = re.compile(r"(?<=\d) (?=\d)")
 
 # The first word of a name that begins like one of these tells the group.
 _GROUP_STEMS = {
@@ -58,18 +59,18 @@ OTHER = "other"
 
 
 def words(name: str) -> tuple[str, ...]:
-    """The words of a name in lower case, with ``l`` and ``r`` written out."""
+    """The words of a name in lower case, numbers with their sign, ``l`` and ``r`` written out."""
     found = (word.lower() for word in _WORD.findall(name))
     return tuple(_SIDES.get(word, word) for word in found)
 
 
 def folded(name: str) -> str:
-    """What all spellings of a name have in common: its words without anything between them.
+    """What all spellings of a name have in common: its words, with a mark between two numbers.
 
-    >>> folded("EyeBlink_L"), folded("eye-blink-left")
-    ('eyeblinkleft', 'eyeblinkleft')
+    >>> folded("EyeBlink_L"), folded("eye-blink-left"), folded("m1.12"), folded("m11.2")
+    ('eyeblinkleft', 'eyeblinkleft', 'm1_12', 'm11_2')
     """
-    return "".join(words(name)) or name
+    return _BETWEEN_NUMBERS.sub("_", " ".join(words(name))).replace(" ", "") or name
 
 
 _ARKIT_SPELLING = {folded(name): name for name in ARKIT_NAMES}
@@ -131,7 +132,8 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
     Raises
     ------
     InputError
-        For the first name that is not there, with the nearest one that is.
+        For the first name that is not there, with the nearest one that is; for two names that
+        would stand at one place.
     """
     index = NameIndex(among)
     positions = [index.find(name) for name in wanted]
@@ -142,7 +144,25 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
         more = positions.count(None) - 1
         also = f" (and {more} more)" if more else ""
         raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it, or map the names.")
-    return np.array(positions, dtype=np.int64)
+    found = np.array(positions, dtype=np.int64)
+    _require_different(found, wanted, among, field)
+    return found
+
+
+def _require_different(
+    found: IntArray, wanted: Sequence[str], among: Sequence[str], field: str
+) -> None:
+    """Refuse that one name stands for two: one of them is missing."""
+    shared = np.flatnonzero(np.bincount(found, minlength=1) > 1)
+    if not len(shared):
+        return
+    first, second = (wanted[index] for index in np.flatnonzero(found == shared[0])[:2])
+    raise InputError(
+        field,
+        f"a name each for {first!r} and {second!r}",
+        f"only {among[shared[0]]!r}",
+        "Add the missing one, or map the names.",
+    )
 
 
 def control_groups(names: Sequence[str]) -> dict[str, IntArray]:

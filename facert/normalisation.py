@@ -44,6 +44,13 @@ class Normalisation:
         """
         mean = np.nanmean(values, axis=0)
         scale = float(np.nanstd(values, axis=0).max())
+        if not np.isfinite(scale):
+            raise InputError(
+                field,
+                "numbers of a sensible size",
+                f"up to {np.nanmax(np.abs(values)):.1e}",
+                "Check the units.",
+            )
         if not scale > STILL * max(float(np.nanmax(np.abs(values))), 1e-300):
             raise InputError(
                 field,

@@ -18,20 +18,30 @@ import numpy as np
 
 import facert
 from facert.data import Controls, FloatArray, Source, SourceKind, Take
-from facert.errors import InputError, reading
-from facert.gplvm.training import Monitor
+from facert.errors import InputError, NumericalError, reading
+from facert.gplvm.noise import with_noise
 from facert.io.tensors import read_tensors, write_tensors
 from facert.methods import make_method
-from facert.methods.base import Labelled, Method, Report, Unlabelled, stack_predictions
+from facert.methods.base import (
+    Labelled,
+    Method,
+    Prediction,
+    Report,
+    Unlabelled,
+    stack_predictions,
+)
 from facert.names import match
 from facert.normalisation import Normalisation
+from facert.optim.monitor import Monitor
 from facert.settings import LimitRule, Settings
 from facert.threads import threads_for
-from facert.training_set import choose_training_set
+from facert.training_set import TrainingSet, choose_training_set
 
 log = logging.getLogger(__name__)
 
 FORMAT = "facert-model"
+# Distances from the training take's mean, in normalised units.
+FAR, ABSURD = 5.0, 1e6
 Mode = Literal["offline", "online"]
 
 
@@ -47,8 +57,12 @@ class Retargeter:
         Works in normalised units.
     source_kind, source_names : str, tuple of str
         What the source must hold.
+    units : str
+        Of the training take's markers; empty when unknown.
     controls : Controls
-        What the result holds; their limits clip it.
+        What the result holds.
+    bounds : array, shape (P, 2), or None
+        What poses are clipped to.
     source_units, target_units : Normalisation
         To normalised units and back.
     figures : dict
@@ -58,7 +72,9 @@ class Retargeter:
     method: Method
     source_kind: SourceKind
     source_names: tuple[str, ...]
+    units: str
     controls: Controls
+    bounds: FloatArray | None
     source_units: Normalisation
     target_units: Normalisation
     figures: dict[str, Any]
@@ -84,18 +100,18 @@ class Retargeter:
         """
         if mode not in get_args(Mode):
             raise InputError("mode", "offline or online", repr(mode), "Choose one of these.")
+        if self.units and take.units and self.units != take.units:
+            raise InputError("units", self.units, take.units, "Convert the take to these units.")
         source = self._matched(take.source)
         frames = self.source_units.apply(source.matrix)
-        if mode == "online":
-            stream = self.method.stream()
-            with threads_for(1):
-                steps = [stream.step(frames[row : row + 1]) for row in range(len(frames))]
-            prediction = stack_predictions(steps)
-        else:
-            prediction = self.method.predict(frames)
+        _check_distance(frames)
+        try:
+            prediction = self._predict(frames, mode)
+        except (np.linalg.LinAlgError, OverflowError):
+            raise NumericalError("the model's numbers are too large or small to map with") from None
         params = self.target_units.undo(prediction.Y)
-        if self.controls.limits is not None:
-            params = np.clip(params, *self.controls.limits.T)
+        if self.bounds is not None:
+            params = np.clip(params, *self.bounds.T)
         return replace(
             take,
             source=source.with_matrix(self.source_units.undo(prediction.X)),
@@ -104,6 +120,13 @@ class Retargeter:
             std=None if prediction.std is None else prediction.std * self.target_units.scale,
             animation=None,
         )
+
+    def _predict(self, frames: FloatArray, mode: Mode) -> Prediction:
+        if mode == "offline":
+            return self.method.predict(frames)
+        stream = self.method.stream()
+        with threads_for(1):
+            return stack_predictions([stream.step(frame[None]) for frame in frames])
 
     @property
     def settings(self) -> Settings:
@@ -116,6 +139,7 @@ class Retargeter:
         return {
             "source_kind": self.source_kind,
             "source_names": list(self.source_names),
+            "units": self.units,
             "target_names": list(self.controls.names),
             "settings": self.settings.as_dict(),
             "figures": self.figures,
@@ -135,6 +159,8 @@ class Retargeter:
             arrays[f"{view}.scale"] = np.array([units.scale])
         if self.controls.limits is not None:
             arrays["target.limits"] = self.controls.limits
+        if self.bounds is not None:
+            arrays["target.bounds"] = self.bounds
         metadata = {
             "format": FORMAT,
             "format_version": 1,
@@ -184,8 +210,10 @@ def train(
     if controls is None:
         raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
     take = replace(take, source=_observed_part(take.source))
+    _warn_of_zeros(take.source)
     data = choose_training_set(take, settings)
     source_units = Normalisation.of(take.source.matrix, f"/source/{take.source.kind}")
+    settings = with_noise(settings, source_units.apply(_complete_frames(take.source, data)))
     poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
     target_units = Normalisation.of(poses, "/target/params")
     labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
@@ -200,10 +228,12 @@ def train(
         method=method,
         source_kind=take.source.kind,
         source_names=take.source.names,
-        controls=replace(controls, limits=_limits(controls.limits, poses, settings.limits)),
+        units=take.units,
+        controls=controls,
+        bounds=_bounds(take, data.Y_labelled, settings.limits),
         source_units=source_units,
         target_units=target_units,
-        figures=_figures(report, seconds, labelled, unlabelled),
+        figures=_figures(report, seconds, labelled),
     )
 
 
@@ -221,6 +251,7 @@ def load(path: str | Path) -> Retargeter:
             settings = Settings().with_changes(metadata["settings"])
             kind, names = metadata["source_kind"], tuple(map(str, metadata["source_names"]))
             controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
+            bounds = Controls(controls.names, arrays.get("target.bounds")).limits
             source_units, target_units = (
                 Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
                 for view in ("source", "target")
@@ -237,10 +268,12 @@ def load(path: str | Path) -> Retargeter:
             method,
             kind,
             names,
+            str(metadata.get("units", "")),
             controls,
+            bounds,
             source_units,
             target_units,
-            metadata.get("figures", {}),
+            dict(metadata.get("figures", {})),
         )
         _check_fit(retargeter, arrays)
     return retargeter
@@ -257,22 +290,59 @@ def _observed_part(source: Source) -> Source:
     return Source(source.values[:, seen], names)
 
 
-def _limits(declared: FloatArray | None, poses: FloatArray, rule: LimitRule) -> FloatArray | None:
-    """What poses are clipped to, (P, 2)."""
+def _bounds(take: Take, labelled: FloatArray, rule: LimitRule) -> FloatArray | None:
+    """What poses are clipped to, (P, 2): declared limits, or the range of all poses allowed.
+
+    These are the poses of the labelled frames (l, P) and all of the animation.
+    """
+    declared = take.controls.limits if take.controls is not None else None
     if rule == "none":
         return None
     if rule == "declared" or declared is not None:
         return declared
+    poses = labelled if take.animation is None else np.vstack([labelled, take.animation])
     return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
 
 
-def _figures(
-    report: Report, seconds: float, labelled: Labelled, unlabelled: Unlabelled
-) -> dict[str, Any]:
+def _complete_frames(source: Source, data: TrainingSet) -> FloatArray:
+    """Frames that show everything, (n, d); where they are few, the filled ones of the training."""
+    complete = source.matrix[~np.isnan(source.matrix).any(axis=1)]
+    filled = np.vstack([data.X_labelled, data.X_unlabelled])
+    return complete if len(complete) > len(filled) else filled
+
+
+def _check_distance(frames: FloatArray) -> None:
+    """Frames in normalised units should be a few units from zero at most.
+
+    Raises
+    ------
+    InputError
+        When they are so far that nothing can be computed.
+    """
+    distance = float(np.nanmax(np.abs(frames)))
+    if distance > ABSURD:
+        raise InputError(
+            "/source",
+            "positions near those of the training take",
+            f"{distance:.1e} times its largest deviation away",
+            "Check units and origin.",
+        )
+    if float(np.nanmedian(np.abs(frames))) > FAR:
+        log.warning("the source lies far from the training take: check units and head motion")
+
+
+def _warn_of_zeros(source: Source) -> None:
+    """Some systems write (0, 0, 0) for a marker that was lost."""
+    if source.kind != "markers":
+        return
+    zeros = int(np.sum(~source.values.any(axis=2)))
+    if zeros:
+        log.warning("%d marker positions are exactly (0, 0, 0): lost ones should be NaN", zeros)
+
+
+def _figures(report: Report, seconds: float, labelled: Labelled) -> dict[str, Any]:
     figures: dict[str, Any] = {
         "labelled frames": len(labelled.X),
-        "unlabelled frames": len(unlabelled.X),
-        "unlabelled poses": len(unlabelled.Y),
         "seconds": seconds,
     }
     result = report.result

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import asdict, dataclass, fields, replace
-from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 from facert.errors import InputError
@@ -118,22 +116,6 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """For a file's metadata."""
         return asdict(self)
-
-
-def read_settings(path: Path) -> dict[str, Any]:
-    """The table of settings in a TOML file; `Settings.with_changes` checks it.
-
-    Raises
-    ------
-    InputError
-        When the file is missing or not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            "the file", "TOML such as 'latent_dim = 8'", f"{error}", "Correct the file.", str(path)
-        ) from None
 
 
 def _check_type(name: str, value: object, hint: Any) -> None:

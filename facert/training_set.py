@@ -95,7 +95,7 @@ def _choose_labels(labels: IntArray, settings: Settings, rng: np.random.Generato
         )
     if count < MIN_LABELS:
         raise InputError(
-            "/target/params",
+            "/target/params" if settings.labels is None else "labels",
             f"at least {MIN_LABELS} posed frames",
             f"{count}",
             "Pose more frames (10 to 40 serve well).",

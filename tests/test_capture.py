@@ -125,6 +125,7 @@ def test_farthest_vertices_spread_over_a_line():
         ({"missing": 1.0}, "--missing"),
         ({"vertices": [0, 60]}, "--vertices: expected different vertices from 0 to 59"),
         ({"vertices": [1, 1]}, "--vertices"),
+        ({"vertices": [1, 10**20]}, "--vertices"),
     ],
 )
 def test_options_out_of_range_are_named(options, message):

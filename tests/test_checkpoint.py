@@ -5,9 +5,9 @@ import pytest
 
 from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 from facert.errors import InputError, OutputExistsError
-from facert.gplvm.training import Monitor, Progress
 from facert.io.tensors import write_tensors
 from facert.optim.base import State
+from facert.optim.monitor import Monitor, Progress
 from facert.optim.scg import SCG
 
 

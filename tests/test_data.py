@@ -67,6 +67,9 @@ def test_arrays_are_copied_and_cannot_be_changed(values):
         (np.zeros((2, 2)), ["a"], "2 names"),
         (np.zeros((2, 2)), ["a", "a"], "'a' twice"),
         (np.zeros((2, 1)), [""], "an empty name"),
+        (np.zeros((2, 1)), ["a\0"], "without control characters"),
+        (np.zeros((2, 1)), ["\x1b[31mred"], "without control characters"),
+        (np.zeros((2, 1)), ["\ud800"], "without control characters"),
     ],
 )
 def test_a_source_that_cannot_be_is_refused(values, names, message):
@@ -147,3 +150,8 @@ def test_a_rig_that_cannot_be_is_refused(changes, message):
     }
     with pytest.raises(InputError, match=message):
         Rig(**(fields | changes))
+
+
+def test_attributes_are_plain_text():
+    with pytest.raises(InputError, match=r"attribute units.*found 'cm\\x00'"):
+        make_take(units="cm\0")

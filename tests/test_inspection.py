@@ -70,3 +70,13 @@ def test_a_rig_is_summed_up():
 def test_a_summary_is_valid_json():
     facts = asdict(summarise(make_take()))
     assert json.loads(json.dumps(facts, allow_nan=False))["source"]["worst"][0]["name"] == "b"
+
+
+def test_markers_at_the_origin_are_counted():
+    take = make_take()
+    assert summarise(take).source.zeros is None
+    values = take.source.values.copy()
+    values[:2, 0] = values[5, 2] = 0.0
+    values[6, 2, 0] = 0.0
+    marked = replace(take, source=Source(values, take.source.names))
+    assert summarise(marked).source.zeros == 3

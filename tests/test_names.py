@@ -68,6 +68,21 @@ def test_a_name_without_a_match_is_told_with_the_nearest():
         match(["jawLeft", "jawOpn", "nose"], ["JawOpen", "JawLeft"], "/source/names")
 
 
+@pytest.mark.parametrize(("one", "other"), [("m1_12", "m11_2"), ("x+1", "x-1"), ("p.1", "p.-1")])
+def test_other_numbers_are_another_name(one, other):
+    assert NameIndex([one]).find(other) is None
+
+
+def test_numbers_are_found_in_other_spellings():
+    assert match(["Marker_012", "m1.12"], ["m1_12", "marker012"], "names").tolist() == [1, 0]
+
+
+@pytest.mark.parametrize("wanted", [["smile_L", "smileLeft"], ["smileLeft", "SmileLeft"]])
+def test_one_name_never_stands_for_two(wanted):
+    with pytest.raises(InputError, match=f"'{wanted[0]}' and '{wanted[1]}', found only 'smile"):
+        match(wanted, ["smile_L", "jaw"], "/source/names")
+
+
 @given(st.lists(st.text(min_size=1), unique=True, min_size=1))
 def test_every_control_is_in_one_group(names):
     groups = control_groups(names)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 import facert
 from facert.cli import (
@@ -22,8 +25,22 @@ from facert.cli import (
 )
 from facert.errors import FacertError
 
+
+class _Commands(TyperGroup):
+    """Typer ends without a word at Ctrl-C; the exit status is the one that shells expect."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that was asked for."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            console.err.print("stopped", style="yellow")
+            raise typer.Exit(130) from None
+
+
 app = typer.Typer(
     name="facert",
+    cls=_Commands,
     help="Carry a facial performance over to any character's rig, from a handful of poses.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -61,12 +78,25 @@ app.command("eval")(evaluate.command)
 
 
 def main() -> None:
-    """Run the command line: exit 0 done, 1 failed, 2 wrong usage, 3 bad input."""
+    """Run the command line: exit 0 done, 1 failed, 2 wrong usage, 3 bad input, 130 stopped."""
     try:
         app()
     except FacertError as error:
         console.err.print(f"error: {error}", style="red", markup=False)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        console.err.print("stopped", style="yellow")
-        sys.exit(130)
+    except OSError as error:
+        console.err.print(f"error: {_of_system(error)}", style="red", markup=False)
+        _drop_output()
+        sys.exit(1)
+
+
+def _of_system(error: OSError) -> str:
+    """The system's word for what went wrong, with the file if it is about one."""
+    where = f"{error.filename}: " if error.filename else "input or output: "
+    return where + (error.strerror or str(error))
+
+
+def _drop_output() -> None:
+    """Let what standard output could not take be lost: Python would try again at its end."""
+    with suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())

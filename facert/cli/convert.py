@@ -35,7 +35,7 @@ def command(
         float | None, typer.Option(min=1e-3, help="Frames a second, if IN does not say.")
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Unit of length, e.g. cm, if IN does not say.")
+        str | None, typer.Option(help="Unit of length, e.g. cm, whatever IN says; numbers stay.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
 ) -> None:

@@ -159,12 +159,14 @@ def _read(path: Path | None, target: str | None) -> Take:
 
 def _journal(problem: Problem, json_path: Path | None) -> Journal | None:
     """Where finished cells are kept: beside the JSON file, if there is to be one."""
+    import facert
     from facert.evaluation.run import fingerprint
-    from facert.io.journal import Journal
+    from facert.io.journal import Journal, source_digest
 
     if json_path is None:
         return None
-    return Journal(json_path.with_suffix(".cells.jsonl"), fingerprint(problem))
+    code = source_digest(Path(facert.__file__).parent)
+    return Journal(json_path.with_suffix(".cells.jsonl"), fingerprint(problem) + code)
 
 
 def _run(problem: Problem, grid: Grid, jobs: int, journal: Journal | None) -> list[Outcome]:

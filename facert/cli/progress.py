@@ -8,8 +8,8 @@ from types import TracebackType
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from facert.cli import console
-from facert.gplvm.training import Monitor
 from facert.optim.base import State
+from facert.optim.monitor import Monitor
 
 
 class ProgressBar(Monitor):

@@ -15,7 +15,7 @@ from facert.settings import Settings
 
 if TYPE_CHECKING:
     from facert.data import Take
-    from facert.gplvm.training import Monitor
+    from facert.optim.monitor import Monitor
     from facert.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")
@@ -76,11 +76,7 @@ def command(
     ] = False,
 ) -> None:
     """Learn to retarget from a take's poses, its other frames, and old animation."""
-    overwrite_model = overwrite or resume  # an interrupted run leaves a model
-    if output.exists() and not overwrite_model:
-        raise OutputExistsError(output)
-    if output.suffix != ".safetensors":
-        raise InputError("--output", "a name ending in .safetensors", str(output), "Rename it.")
+    _require_output(output, curve)
     options = {
         "method": method,
         "labels": labels,
@@ -97,26 +93,47 @@ def command(
     import facert
     from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
     from facert.cli.progress import ProgressBar
-    from facert.settings import read_settings
+    from facert.io.toml import read_toml
 
     settings = DEFAULTS
     if config is not None:
         with reading(config):
-            settings = settings.with_changes(read_settings(config))
+            settings = settings.with_changes(read_toml(config))
     with reading("the options"):
         settings = settings.with_changes({k: v for k, v in options.items() if v is not None})
 
-    data = _read(take, target)
     checkpoint = CheckpointFile(checkpoint_path(output), resume)
+    # An interrupted run leaves a model, and a checkpoint to continue from.
+    overwrite_model = overwrite or checkpoint.continues
+    if output.exists() and not overwrite_model:
+        raise OutputExistsError(output)
+    data = _read(take, target)
     monitors: list[Monitor] = [checkpoint]
     if curve is not None:
-        monitors.append(CurveLog(curve, overwrite))
+        monitors.append(CurveLog(curve, overwrite, checkpoint.continues))
     with reading(take or "the built-in take"), ProgressBar() as bar:
         retargeter = facert.train(data, settings, Monitors(*monitors, bar))
     retargeter.save(output, overwrite_model)
     if retargeter.figures.get("status", "converged") in ("converged", "stalled"):
         checkpoint.remove()
     _print_table(retargeter, output)
+    if retargeter.figures.get("status") == "interrupted":
+        console.log.warning("stopped; --resume continues")
+        raise typer.Exit(130)
+
+
+def _require_output(output: Path, curve: Path | None) -> None:
+    """Refuse names that cannot be written to, before the work is done."""
+    if output.suffix != ".safetensors":
+        raise InputError("--output", "a name ending in .safetensors", str(output), "Rename it.")
+    if curve is not None and curve.suffix == ".safetensors":
+        raise InputError("--log", "a name such as curve.csv", str(curve), "Rename it.")
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            "--output", "a folder that can be made", f"{error.strerror}", "Choose another place."
+        ) from error
 
 
 def _read(path: Path | None, target: str | None) -> Take:
@@ -132,9 +149,12 @@ def _read(path: Path | None, target: str | None) -> Take:
 
 def _print_table(retargeter: Retargeter, output: Path) -> None:
     from rich.table import Table
+    from rich.text import Text
 
     figures = retargeter.figures
-    table = Table(title=f"{retargeter.settings.method} in {output}", show_header=False)
+    # Text, not str: a name in brackets is no markup.
+    title = Text(f"{retargeter.settings.method} in {output}")
+    table = Table(title=title, show_header=False)
     for name, value in figures.items():
         shown = f"{value:.6g}" if isinstance(value, float) else str(value)
         if isinstance(value, float) and not math.isfinite(value):

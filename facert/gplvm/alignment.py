@@ -28,8 +28,10 @@ def align(M: sparse.csr_array, latent_dim: int) -> FloatArray:
         Columns with mean 0 and variance 1, signs fixed so that the result is unique.
     """
     product = (M.T @ M).toarray()
-    _, vectors = eigh(product, subset_by_index=[1, latent_dim])
-    vectors -= vectors.mean(axis=0)
+    # The constant vector is moved out of the way, rather than the first one dropped: where the
+    # views fall into parts that no neighbour joins, there are several vectors of eigenvalue zero.
+    product += np.trace(product) / len(product)
+    _, vectors = eigh(product, subset_by_index=[0, latent_dim - 1])
     vectors /= vectors.std(axis=0)
     largest = np.abs(vectors).argmax(axis=0)
     aligned: FloatArray = vectors * np.sign(vectors[largest, np.arange(latent_dim)])

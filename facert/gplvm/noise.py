@@ -8,9 +8,12 @@ that lids and brows count beside a large jaw; a rich or noisy capture a larger o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from facert.data import FloatArray
+from facert.settings import Settings
 
 # Normalised units. Below the first, source mapping begins to stick to the training latents (their
 # predictive variance vanishes, see facert.gp.kernel); above the second, small motion is lost.
@@ -35,3 +38,22 @@ def expected_noise(X: FloatArray, latent_dim: int) -> float:
     deviations = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) / np.sqrt(len(X))
     left_over = deviations[latent_dim] if latent_dim < len(deviations) else 0.0
     return float(np.clip(left_over, LEAST, MOST))
+
+
+def with_noise(settings: Settings, X: FloatArray) -> Settings:
+    """The settings with the noise of the source filled in where it is left open.
+
+    Parameters
+    ----------
+    settings : Settings
+        σ_c and the source's noise floor may be None.
+    X : array, shape (n, d)
+        Normalised frames, the more the better.
+    """
+    sigma_c = settings.sigma_c
+    if sigma_c is None:
+        sigma_c = expected_noise(X, settings.latent_dim)
+    floor = settings.source_noise_floor
+    return replace(
+        settings, sigma_c=sigma_c, source_noise_floor=sigma_c**2 if floor is None else floor
+    )

@@ -14,6 +14,7 @@ def map_to_target(posterior: Posterior, mapped: Mapped) -> tuple[FloatArray, Flo
 
     The variance is that of the target view at z* plus what the uncertainty of z* itself brings,
     J_yᵀ (∇²F)⁻¹ J_y in the Laplace approximation: hidden markers widen it.
+    In a stream the previous frame's x* counts as exact, so that the std of a long gap is too small.
 
     Parameters
     ----------

@@ -3,55 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from facert.errors import NumericalError
+from facert.errors import InputError, NumericalError
 from facert.gplvm.module import SharedGPLVM
 from facert.optim.base import Optimiser, Result, State, Status
 from facert.optim.flat import FlatObjective
-
-# The relative change is averaged over so many iterations: one short step is not convergence.
-WINDOW = 5
-
-
-@dataclass(frozen=True)
-class Progress:
-    """All that a stopped run needs to go on.
-
-    Parameters
-    ----------
-    state : State
-        Of the optimiser.
-    curve : tuple of float
-        The objective after each iteration so far.
-    """
-
-    state: State
-    curve: tuple[float, ...] = field(default=())
-
-    def converged(self, tolerance: float) -> bool:
-        """Whether the relative decrease an iteration fell below the tolerance."""
-        if len(self.curve) <= WINDOW:
-            return False
-        fall = self.curve[-1 - WINDOW] - self.curve[-1]
-        return fall <= WINDOW * tolerance * max(abs(self.curve[-1]), 1.0)
-
-
-class Monitor:
-    """What watches a training run; this one does nothing.
-
-    Subclasses draw a progress bar, write checkpoints, log the curve.
-    """
-
-    def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  a hook
-        """Where an earlier run with this fingerprint stopped, or None to begin anew."""
-        return None
-
-    def iteration(self, state: State) -> None:
-        """Called after every iteration."""
-
-    def checkpoint(self, progress: Progress) -> None:
-        """Called every so many iterations, and when the run is interrupted."""
+from facert.optim.monitor import Monitor, Progress
 
 
 def train(
@@ -91,6 +49,13 @@ def train(
     began = time.perf_counter()
     objective = FlatObjective(module)
     progress = monitor.resume(fingerprint) or Progress(optimiser.start(objective, objective.vector))
+    if progress.state.x.shape != objective.vector.shape:
+        raise InputError(
+            "the checkpoint",
+            f"{objective.vector.shape} variables",
+            f"{progress.state.x.shape}",
+            "Train without --resume.",
+        )
 
     def watch(state: State) -> bool:
         nonlocal progress

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from facert.errors import InputError, OutputExistsError
@@ -69,6 +69,6 @@ def _flush(path: Path) -> None:
 
 
 def _discard(path: Path) -> None:
-    """Remove the temporary file if it is there; a parent that is no folder has none."""
-    if path.exists():
+    """Remove the temporary file if it is there; where none can be, there is none."""
+    with suppress(OSError):
         path.unlink()

@@ -99,7 +99,7 @@ class GuardedFile:
         value = self._attribute(name)
         if value is None and default is not None:
             return default
-        if not isinstance(value, (int, float, np.integer, np.floating)):
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
             found = "nothing" if value is None else repr(value)
             raise _unexpected(f"attribute {name}", "a number", found)
         return float(value)
@@ -158,7 +158,7 @@ class GuardedFile:
         return np.asarray(_guarded_read(dataset, path, ()))
 
     def _attribute(self, name: str) -> Any:
-        """A scalar attribute of the root, or None."""
+        """A scalar attribute of the root as a plain Python value, or None."""
         attributes, where = self._file.attrs, f"attribute {name}"
         if name not in attributes:
             return None
@@ -171,7 +171,7 @@ class GuardedFile:
             raise _unexpected(where, "one number or text", "something unreadable") from error
         if not plain:
             raise _unexpected(where, "one number or text", "an array")
-        return value.item() if isinstance(value, np.ndarray) else value
+        return value.item() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import logging
 from collections.abc import Mapping
@@ -74,6 +75,14 @@ class Journal:
             log.warning("%s is of other work: begun anew", self.path)
             return []
         return [entry for entry in entries if entry is not None]
+
+
+def source_digest(folder: Path) -> str:
+    """Of all Python files below a folder: work of other code is other work."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 def _parse(line: str) -> dict[str, Any] | None:

@@ -82,6 +82,19 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
     OutputExistsError
         When `path` exists and `overwrite` is not set.
     """
+    with reading(path):
+        ticks, columns = _ticks_and_columns(take)
+    known = np.asarray(~np.isnan(columns).all(axis=1))
+    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
+        writer.writerows(_rows(ticks, columns, known))
+    if not known.all():
+        log.info("%d frames without a pose are rows without a face", np.sum(~known))
+
+
+def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
+    """What to write: the time since midnight, and the numbers (T, 61)."""
     columns = _arkit_columns(take)
     known = np.asarray(~np.isnan(columns).all(axis=1))
     if np.isnan(columns[known]).any():
@@ -96,13 +109,7 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
         raise InputError(
             "start_timecode", "HH:MM:SS:FF.mmm", take.start_timecode, "Correct the attribute."
         )
-    ticks = start + np.rint(take.time * TICKS).astype(np.int64)
-    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
-        writer.writerows(_rows(ticks, columns, known))
-    if not known.all():
-        log.info("%d frames without a pose are rows without a face", np.sum(~known))
+    return start + np.rint(take.time * TICKS).astype(np.int64), columns
 
 
 def parse_timecode(text: str) -> int | None:
@@ -122,7 +129,7 @@ def format_timecode(ticks: int) -> str:
 
 
 def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
-    kept = [row for row in rows if len(row.cells) > 1 and row.cells[1].strip() not in ("", "0")]
+    kept = [row for row in rows if _saw_face(row)]
     if len(kept) < len(rows):
         log.info("dropped %d of %d rows without a face", len(rows) - len(kept), len(rows))
     if not kept:
@@ -130,6 +137,20 @@ def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
             "BlendShapeCount", "rows with a face", "none", "Record again with the face in view."
         )
     return kept
+
+
+def _saw_face(row: Row) -> bool:
+    """Whether the row counts any shapes; a row may end after its timecode."""
+    count = "".join(row.cells[1:2]).strip()
+    try:
+        return float(count or 0) > 0
+    except ValueError:
+        raise InputError(
+            f"line {row.line}, column BlendShapeCount",
+            "the number of shapes, or 0 for no face",
+            repr(count[:40]),
+            "Mend or remove the line.",
+        ) from None
 
 
 def _row_ticks(row: Row) -> int:
@@ -165,7 +186,7 @@ def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:
     for name in (name for name in names if name not in ARKIT_NAMES):
         near = nearest(name, ARKIT_NAMES)
         hint = f"; did you mean {near}?" if near else ""
-        log.warning("column %s is not one of Live Link Face%s", name, hint)
+        log.warning("column %r is not one of Live Link Face%s", name, hint)
     return names
 
 

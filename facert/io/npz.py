@@ -62,7 +62,9 @@ class Archive:
 
     def names(self, key: str) -> tuple[str, ...]:
         """Read an array of strings."""
-        return tuple(str(name) for name in self._read(key, "U", "strings").ravel())
+        names = self._read(key, "U", "strings").ravel()
+        with _parsing(key):
+            return tuple(str(name) for name in names)
 
     def number(self, key: str) -> float:
         """Read an array that holds one number."""
@@ -78,16 +80,24 @@ class Archive:
         if member.file_size > MAX_BYTES or member.compress_type not in _PLAIN:
             found = f"{member.file_size} bytes, compression {member.compress_type}"
             raise InputError(key, f"at most {MAX_BYTES} bytes, deflated", found, "Store it anew.")
-        try:
-            with self._archive.open(member) as stream:
-                dtype = _declared_type(stream, member.file_size)
-            if dtype.kind not in kinds:
-                raise InputError(key, expected, f"{dtype}", "Store plain numbers or strings.")
-            with self._archive.open(member) as stream:
-                return np.asarray(npy_format.read_array(stream, allow_pickle=False))
-        except _DAMAGED as error:
-            found = "damaged data, or less than the array declares"
-            raise InputError(key, "a whole array", found, "Store it anew.") from error
+        with _parsing(key), self._archive.open(member) as stream:
+            dtype = _declared_type(stream, member.file_size)
+        if dtype.kind not in kinds:
+            raise InputError(key, expected, f"{dtype}", "Store plain numbers or strings.")
+        with _parsing(key), self._archive.open(member) as stream:
+            return np.asarray(npy_format.read_array(stream, allow_pickle=False))
+
+
+@contextmanager
+def _parsing(key: str) -> Iterator[None]:
+    """Blame the file for whatever goes wrong while its bytes are made an array or text."""
+    try:
+        yield
+    # NumPy evaluates a header as Python source and trusts its numbers and code points: hostile
+    # bytes raise TokenError, OverflowError, SystemError and more, which nobody can list.
+    except Exception as error:
+        found = "damaged data, or less than the array declares"
+        raise InputError(key, "a whole array", found, "Store it anew.") from error
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from facert.io.text import read_text
 log = logging.getLogger("facert")
 
 NEUTRAL = "neutral"
+MAX_VERTICES = 2**31
 
 
 def read_obj_folder(folder: Path) -> Rig:
@@ -103,7 +104,7 @@ def _vertex(corner: str, count: int) -> int:
     """Index from 0 of a corner ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``; negative: backwards."""
     index = int(corner.split("/", 1)[0])
     position = index - 1 if index > 0 else count + index
-    if index == 0 or position < 0:
+    if index == 0 or not 0 <= position < MAX_VERTICES:
         raise ValueError("no such vertex")
     return position
 

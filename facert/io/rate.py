@@ -16,9 +16,10 @@ def nominal_rate(time: FloatArray) -> float:
     Parameters
     ----------
     time : array, shape (T,)
-        Rising seconds, with or without gaps.
+        Rising seconds, with or without gaps. Of anything else `ONE_FRAME` is said: a `Take` of
+        such times is refused.
     """
-    if len(time) < 2:
+    if time.ndim != 1 or len(time) < 2 or not (time[1:] > time[:-1]).all():
         return ONE_FRAME
     rate = 1.0 / float(np.median(np.diff(time)))
     whole = float(np.rint(rate))

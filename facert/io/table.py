@@ -49,7 +49,7 @@ def read_table(path: Path, fps: float | None = None) -> Take:
             time = _seconds(time, fps)
         values = to_numbers(rows, header, columns)[:, order]
         source = Source(values if order.ndim == 1 else values.reshape(len(rows), -1, 3), names)
-        return Take(time=time, source=source, fps=fps or _rate(time))
+        return Take(time=time, source=source, fps=fps or nominal_rate(time))
 
 
 def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
@@ -87,11 +87,6 @@ def _seconds(frames: FloatArray, fps: float | None) -> FloatArray:
             "column frame", "the rate of the frames", "none", "Give --fps, or a column time."
         )
     return frames / fps
-
-
-def _rate(time: FloatArray) -> float:
-    """The nominal rate where time rises; `Take` tells about the rest."""
-    return nominal_rate(time) if (np.diff(time) > 0).all() else 1.0
 
 
 def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:

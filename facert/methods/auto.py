@@ -149,7 +149,9 @@ class Auto(Regression):
             shrinkage(poses, blended),
         )
         names = [f"{kind}, whitened {p:g}" for kind in ("gpr-linear", "ridge") for p in POWERS]
-        return made, {f"weight of {n}": float(w) for n, w in zip(names, weights, strict=True)}
+        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
+        shares = {f"weight of {n}": float(w) for n, w in zip(names, weights, strict=True)}
+        return made, {**counts, **shares}
 
 
 def blend_weights(errors: Sequence[FloatArray]) -> FloatArray:

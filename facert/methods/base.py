@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from facert.data import FloatArray
-from facert.gplvm.training import Monitor
 from facert.optim.base import Result
+from facert.optim.monitor import Monitor
 from facert.settings import Settings
 
 

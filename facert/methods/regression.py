@@ -16,9 +16,9 @@ import numpy as np
 from facert.data import FloatArray
 from facert.errors import InputError
 from facert.gaps import Gaussian
-from facert.gplvm.training import Monitor
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
 from facert.metrics import rms
+from facert.optim.monitor import Monitor
 from facert.settings import Settings
 from facert.threads import threads_for
 

@@ -122,4 +122,5 @@ class SemiSupervisedGPR(Regression):
         shrink = shrinkage(poses, ProcessMap(features, targets, theta).left_out_errors)
         made = ShrunkMap(labelled.X, labelled.Y, theta, centre, basis, mean, shrink)
         directions = float(np.count_nonzero(basis.any(axis=0)))
-        return made, {"log likelihood": found.value, "directions": directions}
+        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
+        return made, {**counts, "log likelihood": found.value, "directions": directions}

@@ -6,7 +6,6 @@ import hashlib
 import logging
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -19,13 +18,14 @@ from facert.gp.posterior import Posterior
 from facert.gplvm.alignment import align, principal_components
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
-from facert.gplvm.noise import expected_noise
+from facert.gplvm.noise import with_noise
 from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
 from facert.gplvm.target_mapping import map_to_target
-from facert.gplvm.training import Monitor, train
+from facert.gplvm.training import train
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
 from facert.optim.base import Optimiser
 from facert.optim.lbfgs import LBFGS
+from facert.optim.monitor import Monitor
 from facert.optim.scg import SCG
 from facert.settings import OptimiserName, Settings
 from facert.threads import threads_for
@@ -67,7 +67,7 @@ class SemiSupervisedSGPLVM:
         """
         X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
         count = len(labelled.X)
-        self.settings = _with_noise(self._given, X)
+        self.settings = with_noise(self._given, X)
         with threads_for(len(X) + len(Y) - count):
             module = self._initial_module(X, Y, count)
             result = train(
@@ -159,7 +159,11 @@ class SemiSupervisedSGPLVM:
         return OPTIMISERS[self.settings.optimizer]()
 
     def _figures(self, labelled: Labelled) -> dict[str, float]:
-        figures: dict[str, float] = {"sigma_c": self.settings.sigma_c or math.nan}
+        figures: dict[str, float] = {
+            "unlabelled frames": len(self.source_.X) - len(labelled.X),
+            "unlabelled poses": len(self.target_.X) - len(labelled.X),
+            "sigma_c": self.settings.sigma_c or math.nan,
+        }
         for view, posterior in (("source", self.source_), ("target", self.target_)):
             for index, value in enumerate(posterior.kernel.theta, start=1):
                 figures[f"{view} theta{index}"] = value
@@ -204,22 +208,11 @@ class _SharedStream:
         return self.method._to_target(self.previous)
 
 
-def _with_noise(settings: Settings, X: FloatArray) -> Settings:
-    """The settings with the noise of the source filled in where it is left open."""
-    sigma_c = settings.sigma_c
-    if sigma_c is None:
-        sigma_c = expected_noise(X, settings.latent_dim)
-    floor = settings.source_noise_floor
-    return replace(
-        settings, sigma_c=sigma_c, source_noise_floor=sigma_c**2 if floor is None else floor
-    )
-
-
 def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
     """What a checkpoint must agree with; rounded, so that another machine agrees as well."""
     digest = hashlib.sha256()
     for array in (X, Y):
-        digest.update(np.round(array, 6).tobytes())
+        digest.update((np.round(array, 6) + 0.0).tobytes())  # no -0.0
     shaping = (
         settings.method,
         settings.latent_dim,
@@ -245,6 +238,8 @@ def _device(name: str) -> torch.device:
     """
     try:
         device = torch.device(name)
+        if device.type not in ("cpu", "cuda"):
+            raise RuntimeError("only cpu and cuda are known to work")
         torch.empty(0, device=device)
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         reason = str(error).splitlines()[0]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 CURVE, TRUTH, INK = "#1f6f8b", "#c9a26b", "#3a3f47"
 MOST = 8  # curves, if none are named
+MAX_CURVES = 40
 
 
 def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = ()) -> Figure:
@@ -41,10 +42,14 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
     Raises
     ------
     InputError
-        When the take has no poses, or one of the takes lacks a control.
+        When the take has no poses, one of the takes lacks a control, or `names` are too many.
     """
     from matplotlib.figure import Figure
 
+    if len(names) > MAX_CURVES:
+        raise InputError(
+            "--controls", f"at most {MAX_CURVES} names", f"{len(names)}", "Draw several pictures."
+        )
     names = tuple(names) or _most_varying(take)
     figure = Figure(figsize=(10, 1.05 * len(names) + 0.7), dpi=150, layout="constrained")
     grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]

@@ -20,6 +20,7 @@ CELL = 2.2  # inches a picture
 RESOLUTION = 150  # pixels an inch
 TURN = -0.22  # radians; seen a little from the side, a face has more shape
 INK = "#3a3f47"
+MAX_FRAMES = 40
 
 
 def render_faces(take: Take, rig: Rig, frames: Sequence[int], truth: Take | None = None) -> Figure:
@@ -134,7 +135,7 @@ def require_poses(take: Take) -> FloatArray:
     InputError
         When it has none.
     """
-    if take.params is None:
+    if take.params is None or not len(take.labels):
         raise InputError(
             "/target/params", "poses of the character", "none", "Give a take that was retargeted."
         )
@@ -142,6 +143,10 @@ def require_poses(take: Take) -> FloatArray:
 
 
 def _checked_frames(frames: Sequence[int], take: Take) -> list[int]:
+    if len(frames) > MAX_FRAMES:
+        raise InputError(
+            "--frames", f"at most {MAX_FRAMES} frames", f"{len(frames)}", "Draw several pictures."
+        )
     outside = [frame for frame in frames if not 0 <= frame < len(take)]
     if outside or not frames:
         raise InputError(

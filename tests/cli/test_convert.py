@@ -106,3 +106,9 @@ def test_bad_input_gets_one_line_and_no_output(facert, tmp_path, make, name):
     assert f"{tmp_path / name}: " in failed.err
     assert message in failed.err
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_the_unit_that_is_asked_for_replaces_the_one_of_the_file(facert, recording, tmp_path):
+    facert("convert", recording, tmp_path / "one.h5", "--units", "cm")
+    facert("convert", tmp_path / "one.h5", tmp_path / "two.h5", "--units", "mm")
+    assert read_take_file(tmp_path / "two.h5").units == "mm"

@@ -124,7 +124,7 @@ def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow,
     quick.write_text("checkpoint_every = 15\nmax_iterations = 5000\n")
     api.write_take(make_take(frames=160, animation=100), take)
     arguments = ("train", take, "-o", model, "--config", slow)
-    assert stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model)) == 0
+    assert stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model)) == 130
     stopped = api.load(model).figures
     assert stopped["status"] == "interrupted"
     assert checkpoint_path(model).exists()
@@ -217,7 +217,7 @@ def remove(path, make_take):
         (freeze, (), "take.h5: /source/markers: expected values that change"),
         (remove_targets, (), "take.h5: /target: expected poses"),
         (remove, (), "take.h5"),
-        (spoil_nothing, ("--labels", 2), "take.h5: /target/params: expected at least 3"),
+        (spoil_nothing, ("--labels", 2), "take.h5: labels: expected at least 3"),
         (spoil_nothing, ("--labels", 99), "take.h5: labels: expected at most 12"),
         (spoil_nothing, ("--latent-dim", 0), "the options: latent_dim: expected at least 1"),
         (spoil_nothing, ("--optimizer", "adam"), "the options: optimizer: expected one of"),
@@ -242,7 +242,7 @@ def test_bad_input_gets_one_line_and_leaves_no_file(
     [
         ("latent_dims = 8", "latent_dims: expected one of"),
         ("latent_dim = 'many'", "latent_dim: expected int"),
-        ("latent_dim = ", "the file: expected TOML"),
+        ("latent_dim = ", "file: expected TOML"),
         ("sigma_c = inf", "sigma_c: expected a finite number"),
     ],
 )
@@ -265,3 +265,24 @@ def test_the_model_needs_its_ending(facert, take, tmp_path):
     failed = facert("train", take, "-o", tmp_path / "model.pt")
     assert failed.code == 3
     assert "--output: expected a name ending in .safetensors" in failed.err
+
+
+def test_resume_without_a_checkpoint_does_not_replace_a_finished_model(facert, take, model):
+    assert facert("train", take, "-o", model).code == 0
+    finished = model.read_bytes()
+
+    refused = facert("train", take, "-o", model, "--labels", 5, "--resume")
+    assert refused.code == 2
+    assert model.read_bytes() == finished
+
+
+def test_the_log_goes_on_where_a_stopped_run_left_it(facert, make_take, slow, model, tmp_path):
+    take, curve = tmp_path / "take.h5", tmp_path / "curve.csv"
+    api.write_take(make_take(frames=160, animation=100), take)
+    arguments = ("train", take, "-o", model, "--config", slow, "--log", curve)
+    stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model))
+    begun = curve.read_text()
+
+    assert facert(*arguments, "--resume").code == 0
+    assert curve.read_text().startswith(begun)
+    assert len(curve.read_text()) > len(begun)

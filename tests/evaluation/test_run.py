@@ -1,5 +1,6 @@
 import json
 from itertools import islice
+from multiprocessing import active_children
 
 import numpy as np
 import pytest
@@ -77,6 +78,14 @@ def test_outcomes_do_not_depend_on_the_number_of_processes(make, quick):
     here, there = (scores(run(make(), GRID, quick, jobs)) for jobs in (1, 2))
     assert here == there
     assert set(here) == set(GRID.cells)
+
+
+@pytest.mark.slow
+def test_processes_end_with_an_interrupted_run(make, quick):
+    outcomes = run(make(), GRID, quick, jobs=2)
+    next(outcomes)
+    outcomes.close()
+    assert not active_children()
 
 
 def test_an_interrupted_run_continues_and_computes_nothing_twice(make, quick, tmp_path):

@@ -7,9 +7,10 @@ import torch
 from facert.gplvm.alignment import align
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
-from facert.gplvm.training import Monitor, Progress, train
+from facert.gplvm.training import train
 from facert.optim.base import State
 from facert.optim.lbfgs import LBFGS
+from facert.optim.monitor import Monitor, Progress
 from facert.optim.scg import SCG
 
 OPTIONS = {

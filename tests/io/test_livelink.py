@@ -75,7 +75,7 @@ def test_an_unknown_column_stays_and_is_told_about(path, caplog):
 
 def test_rows_without_a_face_are_dropped_and_counted(path, caplog):
     caplog.set_level(logging.INFO)
-    rows = [["0"], ["2", 0.1, 0.2], ["0", "", ""]]
+    rows = [["0"], ["2", 0.1, 0.2], ["0.0", "", ""]]
     write(path, names=ARKIT_NAMES[:2], rows=rows)
     take = read_livelink(path)
     assert len(take) == 1
@@ -109,6 +109,7 @@ def test_the_rate_is_that_of_the_usual_spacing_whatever_the_gaps(rate):
     [
         ("01:00:00:06.000,2,0.1", "line 3: expected 4 cells"),
         ("01:00:00:06.000,2,0.1,x", "line 3, column b: expected a number, found 'x'"),
+        ("01:00:00:06.000,abc,0.1,0.2", "line 3, column BlendShapeCount: .* found 'abc'"),
         ("one o'clock,2,0.1,0.2", "line 3, column Timecode: expected HH:MM:SS:FF.mmm"),
         ('01:00:00:06.000,2,0.1,"0.2', "line 3"),
         ("01:00:00:06.000,2,inf,0.2", "infinite"),
@@ -166,8 +167,9 @@ def test_what_live_link_cannot_hold_is_refused_before_a_file_is_made(path):
         (partial, "known in part"),
         (odd_start, "start_timecode"),
     ]:
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, match=message) as caught:
             write_livelink(take, path)
+        assert str(caught.value).startswith(f"{path}: ")
     assert not path.exists()
 
 

@@ -17,6 +17,7 @@ def path(tmp_path):
 TRACK = {"markers": np.zeros((3, 2, 3), "f4"), "marker_names": ["a", "b"], "fps": 30.0}
 UNITS = {"units": np.ones((3, 1)), "unit_names": ["u"]}
 SOLVED = {"solved": np.ones((3, 2)), "solved_names": ["s", "t"]}
+TIMED = {"markers": TRACK["markers"], "marker_names": TRACK["marker_names"]}
 RIG = {"neutral": np.eye(3), "faces": np.array([[0, 1, 2]], "i4")}
 
 
@@ -75,6 +76,11 @@ def test_one_of_several_sets_of_shapes_is_chosen(path):
         (TRACK | {"marker_names": [1, 2]}, "marker_names: expected strings"),
         (TRACK | {"fps": [30.0, 30.0]}, "fps: expected one number"),
         (TRACK | {"units": np.ones((2, 1)), "unit_names": ["u"]}, "/target/params"),
+        (TRACK | {"marker_names": ["a", "b\ud800"]}, "control characters"),
+        (TRACK | {"marker_names": np.array([97, 2**31 - 1], "u4").view("U1")}, "damaged"),
+        (TIMED | {"time": np.zeros(3)}, "/time: expected finite, strictly rising"),
+        (TIMED | {"time": 0.0}, "/time: expected 3 seconds"),
+        (TIMED | {"time": [0.0, np.inf, np.inf]}, "/time"),
     ],
 )
 def test_what_is_wrong_is_named(path, entries, message):
@@ -95,11 +101,19 @@ def member(array=None, declare=None, version=None):
     return stream.getvalue()
 
 
+def member_with_header(header):
+    """The bytes of an .npy member with any text as its header."""
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode()
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         (member(declare=(10**12,)), "declares"),
         (member(np.zeros(3))[:-8], "declares"),
+        (member(declare=(0, 99999999999999, 99999999999999999999)), "damaged"),
+        (member_with_header("(" * 5000), "damaged"),
+        (member_with_header("'''"), "damaged"),
         (b"no array", "damaged"),
         (member(np.zeros(3), version=(3, 0)), "damaged"),
     ],

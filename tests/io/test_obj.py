@@ -26,7 +26,10 @@ def test_negative_corners_count_from_the_vertices_so_far(tmp_path):
     assert read_obj(path)[1].tolist() == [[0, 1, 2]]
 
 
-@pytest.mark.parametrize("line", ["v 0 0", "v a b c", "f 1 2", "f 1 2 0", "f -9 1 2", "f x 1 2"])
+@pytest.mark.parametrize(
+    "line",
+    ["v 0 0", "v a b c", "f 1 2", "f 1 2 0", "f -9 1 2", "f x 1 2", f"f 1 2 {'9' * 30}"],
+)
 def test_a_broken_line_is_named(tmp_path, line):
     path = tmp_path / "mesh.obj"
     path.write_text(f"{SQUARE}{line}\n")

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from facert.errors import DeviceError
-from facert.gplvm.training import Monitor
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.optim.monitor import Monitor
 from facert.settings import Settings
 
 QUICK = {"latent_dim": 3, "neighbours": 5, "max_iterations": 40}

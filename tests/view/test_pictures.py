@@ -166,3 +166,17 @@ def test_nothing_to_plot_without_poses() -> None:
     bare = Take(time=TAKE.time, source=TAKE.source)
     with pytest.raises(InputError, match="/target/params"):
         plot_controls(bare)
+
+
+def test_a_take_whose_frames_all_lack_a_pose_is_not_drawn() -> None:
+    empty = take_with(np.full((20, 2), np.nan))
+    for draw in (lambda: plot_controls(empty), lambda: render_faces(empty, RIG, [0])):
+        with pytest.raises(InputError, match="/target/params"):
+            draw()
+
+
+def test_a_picture_has_its_bounds() -> None:
+    with pytest.raises(InputError, match="--controls: expected at most 40"):
+        plot_controls(TAKE, names=["up"] * 41)
+    with pytest.raises(InputError, match="--frames: expected at most 40"):
+        render_faces(TAKE, RIG, [0] * 41)

@@ -1,0 +1,27 @@
+"""Settings in a TOML file."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from facert.errors import InputError, reading
+from facert.io.text import read_text
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; whoever takes it checks its names and values.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, too large, or not TOML.
+    """
+    with reading(path):
+        try:
+            return tomllib.loads(read_text(path))
+        except (ValueError, RecursionError) as error:
+            raise InputError(
+                "file", "TOML such as 'latent_dim = 8'", f"{error}", "Correct the file."
+            ) from error

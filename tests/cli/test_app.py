@@ -1,0 +1,37 @@
+"""What every command does when the system, or the user, stops it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from facert.cli import app, inspect
+
+
+def test_a_name_that_is_too_long_is_one_line(facert, tmp_path):
+    failed = facert("inspect", tmp_path / f"{'x' * 300}.h5")
+    assert failed.code == 1
+    assert failed.err.count("\n") == 1
+    assert failed.err.rstrip().endswith("File name too long")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+def test_a_full_disk_is_one_line():
+    command = [sys.executable, "-c", "from facert.cli.app import main; main()", "--version"]
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == f"error: input or output: {os.strerror(28)}\n"
+
+
+def test_ctrl_c_says_stopped(facert, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(inspect, "_facts", interrupted)
+    stopped = facert("inspect", app.__file__)
+    assert (stopped.code, stopped.err) == (130, "stopped\n")
