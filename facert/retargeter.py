@@ -30,7 +30,7 @@ from facert.methods.base import (
     Unlabelled,
     stack_predictions,
 )
-from facert.names import match
+from facert.names import NameIndex, match
 from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.settings import LimitRule, Settings
@@ -171,7 +171,11 @@ class Retargeter:
         write_tensors(Path(path), arrays, metadata, overwrite)
 
     def _matched(self, source: Source) -> Source:
-        """The source's columns in the order the model knows them."""
+        """The source's columns in the order the model knows them.
+
+        A marker that the take lacks is one that was not observed: the job goes on, with a warning.
+        Where the take has unknown names instead, or lacks most, it is misspelt or another set.
+        """
         if source.kind != self.source_kind:
             raise InputError(
                 "/source",
@@ -179,11 +183,22 @@ class Retargeter:
                 source.kind,
                 "Give a take of the kind it was trained on.",
             )
-        columns = match(self.source_names, source.names, "/source/names")
-        extra = len(source.names) - len(columns)
+        index = NameIndex(source.names)
+        absent = [name for name in self.source_names if index.find(name) is None]
+        present = [name for name in self.source_names if index.find(name) is not None]
+        extra = len(source.names) - len(present)
+        if absent and (extra or len(absent) > len(present)):
+            match(absent, source.names, "/source/names")  # tells which, and the nearest name
+        columns = match(present, source.names, "/source/names")
+        if absent:
+            log.warning("taken as not observed, as the take lacks them: %s", ", ".join(absent))
         if extra:
             log.info("%d names of the source are not in the model: passed over", extra)
-        return Source(source.values[:, columns], self.source_names)
+        values = np.full(
+            (len(source.values), len(self.source_names), *source.values.shape[2:]), np.nan
+        )
+        values[:, [self.source_names.index(name) for name in present]] = source.values[:, columns]
+        return Source(values, self.source_names)
 
 
 def train(

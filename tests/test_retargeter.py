@@ -255,6 +255,22 @@ def test_a_source_that_the_model_does_not_know_is_refused(retargeter, take, sour
         retargeter.retarget(replace(take, source=source))
 
 
+def test_a_marker_that_the_take_lacks_is_taken_as_hidden(retargeter, take, caplog):
+    names, values = take.source.names, take.source.values
+    hidden = values.copy()
+    hidden[:, 0] = np.nan
+    without = retargeter.retarget(replace(take, source=Source(values[:, 1:], names[1:])))
+
+    expected = retargeter.retarget(replace(take, source=Source(hidden, names)))
+    np.testing.assert_array_equal(without.params, expected.params)
+    assert names[0] in caplog.text
+
+
+def test_other_units_are_refused(retargeter, take):
+    with pytest.raises(InputError, match="units: expected"):
+        retargeter.retarget(replace(take, units="furlong"))
+
+
 def tampered(model, **changes):
     """The model file with some arrays (or, as None, none) and metadata replaced."""
     content = model.read_bytes()

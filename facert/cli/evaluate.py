@@ -114,7 +114,7 @@ def command(
         journal = _journal(problem, json_path)
         outcomes = _run(problem, grid, jobs or os.cpu_count() or 1, journal)
     rows = summarise(outcomes, protocol)
-    title = _title(take, across, problem, grid)
+    title = _title(_name(take, target), across, problem, grid)
     console.out.print(error_table(rows, title))
     if json_path is not None:
         files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
@@ -198,11 +198,16 @@ def _watched(outcomes: Iterator[Outcome], total: int) -> Iterator[Outcome]:
                 console.log.info("%d of %d cells", done, total)
 
 
-def _title(take: Path | None, across: Path | None, problem: Problem, grid: Grid) -> str:
+def _name(take: Path | None, target: str | None) -> str:
+    if take is None:
+        return BUILT_IN
+    return take.name if target is None else f"{take.name} ({target})"
+
+
+def _title(name: str, across: Path | None, problem: Problem, grid: Grid) -> str:
     protocol = problem.protocol
-    where = take.name if take is not None else BUILT_IN
     tested = f"tested on {across.name}" if across is not None else f"{protocol.split} split"
-    parts = [where, tested, f"{grid.repeats} draws"]
+    parts = [name, tested, f"{grid.repeats} draws"]
     if protocol.noise:
         parts.append(f"noise {protocol.noise:g}")
     if protocol.missing:

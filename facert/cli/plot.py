@@ -19,6 +19,9 @@ def command(
     controls: Annotated[
         str, typer.Option(help="For instance smile,jaw_open; by default the most varying.")
     ] = "",
+    target: Annotated[
+        str | None, typer.Option(help="Which of several targets of .npz takes.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
 ) -> None:
     """Draw controls over time, with their uncertainty and the truth."""
@@ -28,8 +31,8 @@ def command(
     from facert.view.plots import plot_controls
 
     require_picture_name(output, overwrite)
-    take = read_take_file(take_path)
-    truth = read_take_file(truth_path) if truth_path else None
+    take = read_take_file(take_path, target)
+    truth = read_take_file(truth_path, target) if truth_path else None
     names = [name.strip() for name in controls.split(",")] if controls else []
     with reading(take_path):
         figure = plot_controls(take, truth, names)

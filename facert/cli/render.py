@@ -22,6 +22,12 @@ def command(
     frames: Annotated[
         str, typer.Option(help="For instance 0,30,60; by default some that differ well.")
     ] = "",
+    target: Annotated[
+        str | None, typer.Option(help="Which of several targets of .npz takes.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
 ) -> None:
     """Draw faces: markers, the character with the take's poses, and with the true ones."""
@@ -31,8 +37,8 @@ def command(
     from facert.view.render import choose_frames, render_faces, require_poses
 
     require_picture_name(output, overwrite)
-    take, rig = read_take_file(take_path), read_rig_file(rig_path)
-    truth = read_take_file(truth_path) if truth_path else None
+    take, rig = read_take_file(take_path, target), read_rig_file(rig_path, shapes)
+    truth = read_take_file(truth_path, target) if truth_path else None
     with reading(take_path):
         chosen = _parse(frames) if frames else choose_frames(require_poses(take), FACES)
         figure = render_faces(take, rig, chosen, truth)

@@ -24,7 +24,10 @@ DEFAULTS = Settings()
 
 def _setting(name: str, text: str) -> Any:
     """An option that is None unless given, so that it can come before the config file."""
-    return typer.Option(help=text, show_default=str(getattr(DEFAULTS, name)))
+    default = getattr(DEFAULTS, name)
+    return typer.Option(
+        help=text, show_default="from the data" if default is None else str(default)
+    )
 
 
 def command(

@@ -96,8 +96,9 @@ class Problem:
 
     @property
     def ranges(self) -> FloatArray:
-        """Range of each control over the known poses of the test take, (P,)."""
-        return np.asarray(np.ptp(_poses(self.test)[self.test.labels], axis=0))
+        """Range of each control over all known poses of both takes, (P,)."""
+        poses = np.vstack([_poses(take)[take.labels] for take in (self.take, self.test)])
+        return np.asarray(np.ptp(poses, axis=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,3 +123,4 @@ def test_a_real_track_is_evaluated(facert, real_data):
     track = real_data / "tracks" / "utterance_a.npz"
     outcome = facert("eval", track, "--target", "arkit", *QUICK)
     assert outcome.code == 0, outcome.err
+    assert "utterance_a.npz (arkit), random split" in outcome.out

@@ -22,13 +22,15 @@ COMMANDS = [
 @pytest.mark.slow
 def test_quick_start_and_python_run_as_printed(facert, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    write_take, use_from_python = PYTHON
+    write_take, use_from_python = PYTHON[0], PYTHON[-1]
 
     exec(write_take, {})
     for command in COMMANDS:
         outcome = facert(*command)
         assert outcome.code == 0, outcome.err
     exec(use_from_python, {})
+    exec(PYTHON[1], {})  # poses for a recording
+    assert facert("inspect", "take.h5").code == 0
 
     assert len(COMMANDS) == 6
     assert (tmp_path / "curves.png").exists()

@@ -137,6 +137,8 @@ def test_another_take_is_tested_in_full_with_controls_by_name(make_take):
     chosen = draw(problem, 10, 20, 0)
     assert chosen.test.tolist() == list(range(40))
     assert np.array_equal(true_poses(problem, chosen), other.params)
+    both = np.vstack([take.params, other.params])
+    assert problem.ranges == pytest.approx(both.max(axis=0) - both.min(axis=0))
 
 
 def test_what_does_not_fit_together_is_refused(make, make_take):
