@@ -143,7 +143,7 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
         hint = f"nearest: {near!r}" if near else f"{len(among)} other names"
         more = positions.count(None) - 1
         also = f" (and {more} more)" if more else ""
-        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it, or map the names.")
+        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it in one of the two files.")
     found = np.array(positions, dtype=np.int64)
     _require_different(found, wanted, among, field)
     return found

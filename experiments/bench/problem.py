@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
+import numpy as np
+import torch
+from threadpoolctl import threadpool_limits
 
-# Before NumPy is loaded: one BLAS thread, as everywhere in facert for problems of this size.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
+from experiments.tracks import DATA, draw, read_track
+from facert import Take
 
-import numpy as np  # noqa: E402
-import torch  # noqa: E402
-
-from experiments.tracks import DATA, draw, read_track  # noqa: E402
-from facert import Take  # noqa: E402
-
+# One BLAS thread, as everywhere in facert for problems of this size.
 torch.set_num_threads(1)
+threadpool_limits(1)
 
 
 def bench_take() -> tuple[str, Take]:
