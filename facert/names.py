@@ -143,7 +143,7 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
         hint = f"nearest: {near!r}" if near else f"{len(among)} other names"
         more = positions.count(None) - 1
         also = f" (and {more} more)" if more else ""
-        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it in one of the two files.")
+        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it in one of the files.")
     found = np.array(positions, dtype=np.int64)
     _require_different(found, wanted, among, field)
     return found
@@ -161,7 +161,7 @@ def _require_different(
         field,
         f"a name each for {first!r} and {second!r}",
         f"only {among[shared[0]]!r}",
-        "Add the missing one, or map the names.",
+        "Add the missing one, or rename it.",
     )
 
 
