@@ -10,8 +10,8 @@ The gradient comes from one Cholesky factor. With A = K⁻¹ F, where F Fᵀ = X
     ∂/∂Z      = -2 θ2 (diag(W 1) Z - W Z),
     ∂/∂log θ1 = Σ W,      ∂/∂log θ2 = <Z, ∂/∂Z>/2,      ∂/∂noise = tr G,
 
-K_smooth being K without its noise. Differentiating through the factorisation instead costs about
-ten times as much and gives the same numbers; a test holds the two against each other.
+K_smooth being K without its noise. Differentiating through the factorisation instead costs several
+times as much and gives the same numbers; a test holds the two against each other.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ class _NegativeLogLikelihood(torch.autograd.Function):
     def forward(
         ctx: Any, Z: Tensor, log_kernel: Tensor, F: Tensor, columns: int, noise_floor: float
     ) -> Tensor:
+        """The value; the gradient is computed beside it, and kept for `backward`."""
         theta1, theta2, excess = log_kernel.exp().tolist()
         n = len(Z)
 

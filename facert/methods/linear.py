@@ -65,13 +65,13 @@ class RidgeFit:
         W.
     penalties : array, shape (d_y,)
         Of each control, relative to the mean sum of squares of a frame.
-    errors : array, shape (n, d_y)
+    left_out_errors : array, shape (n, d_y)
         Each row less what is said of it when it is left out.
     """
 
     weights: FloatArray
     penalties: FloatArray
-    errors: FloatArray
+    left_out_errors: FloatArray
 
 
 def leave_one_out_ridge(X: FloatArray, Y: FloatArray) -> RidgeFit:

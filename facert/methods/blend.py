@@ -1,17 +1,17 @@
-"""`auto`: a blend of quick experts, weighted by how well each foretells the labels.
+"""Semi-supervised regression: experts on features of every frame, shrunk by every pose.
 
-No one recipe suits all captures: clean ones with many small directions want whitened features, real
-markers the source as it is, and where the rig follows the markers linearly a ridge is hard to beat.
-The experts here are a Gaussian process with a linear term, and a ridge, each on the source's own
-proportions and on features whitened by a quarter and by half. All leave-one-out predictions are
-known in closed form. With P_e (l, d_y) those of expert e, clipped to the range of all known poses,
-the weights minimise
+`ssgpr` has one expert, a Gaussian process with a linear term on half-whitened features. No one
+recipe suits all captures, though: clean ones with many small directions want whitened features,
+real markers the source as it is, and where the rig follows the markers linearly a ridge is hard to
+beat. `auto` has both, on the source's own proportions and on features whitened by a quarter and by
+half. All leave-one-out predictions are known in closed form. With P_e (l, d_y) those of expert e,
+clipped to the range of all known poses, the weights minimise
 
     |Σ_e w_e P_e - Y|² + ρ E |w|²,      w_e >= 0,      Σ_e w_e = 1,
 
 E the least squared error of one expert: few labels say little about which expert is best, and ρ
 then keeps the weights together (Breiman 1996, Stacked Regressions). The blend is shrunk towards
-likely poses as in `facert.methods.semisupervised`.
+likely poses, see `facert.methods.shrinkage`.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ from facert.methods.features import whitening
 from facert.methods.gpr import ProcessMap
 from facert.methods.linear import leave_one_out_ridge
 from facert.methods.regression import Map, Regression
-from facert.methods.semisupervised import shrinkage
+from facert.methods.shrinkage import shrinkage
 
-POWERS = (0.0, 0.25, 0.5)  # of the whitening
 TOGETHER = 0.1  # ρ
 
 
@@ -48,7 +47,7 @@ class BlendMap(Map):
     centre : array, shape (d_x,)
         Mean of all frames.
     bases : array, shape (p, d_x, d_x)
-        Of the features, see `facert.methods.features.whitening`.
+        Of the features of each process, see `facert.methods.features.whitening`.
     thetas : array, shape (p, 4)
         Of each process, see `facert.methods.gpr.ProcessMap`.
     weights : array, shape (p,)
@@ -58,7 +57,7 @@ class BlendMap(Map):
     mean : array, shape (d_y,)
         Mean of all poses.
     shrink : array, shape (d_y, d_y)
-        See `facert.methods.semisupervised.shrinkage`.
+        See `facert.methods.shrinkage.shrinkage`.
     """
 
     axes: ClassVar[Mapping[str, str]] = {
@@ -105,10 +104,14 @@ class BlendMap(Map):
         ]
 
 
-class Auto(Regression):
-    """The blend of all experts."""
+class Blend(Regression):
+    """Experts on whitened features, weighted by how well each foretells the labels."""
 
     map_type = BlendMap
+    process_powers: ClassVar[tuple[float, ...]]
+    """p of the features of each Gaussian process, see `facert.methods.features`."""
+    ridge_powers: ClassVar[tuple[float, ...]]
+    """The same of each ridge."""
 
     def _learn(
         self, labelled: Labelled, unlabelled: Unlabelled
@@ -117,41 +120,59 @@ class Auto(Regression):
         poses = np.vstack([labelled.Y, unlabelled.Y])
         centre, mean = frames.mean(axis=0), poses.mean(axis=0)
         offsets, targets = labelled.X - centre, labelled.Y - mean
-        bases = [np.eye(len(centre)), *(whitening(frames, power) for power in POWERS[1:])]
+        bases = {p: _basis(frames, p) for p in {*self.process_powers, *self.ridge_powers}}
 
-        kernels = [maximise_likelihood(offsets @ basis, targets).kernel for basis in bases]
-        thetas = [np.array([*kernel.theta, kernel.linear]) for kernel in kernels]
-        processes = [
-            ProcessMap(offsets @ basis, targets, theta)
-            for basis, theta in zip(bases, thetas, strict=True)
-        ]
-        ridges = [leave_one_out_ridge(offsets @ basis, targets) for basis in bases]
+        processes = [_process(offsets @ bases[p], targets) for p in self.process_powers]
+        ridges = [leave_one_out_ridge(offsets @ bases[p], targets) for p in self.ridge_powers]
         errors = [process.left_out_errors for process in processes]
-        errors += [ridge.errors for ridge in ridges]
-
+        errors += [ridge.left_out_errors for ridge in ridges]
         limits = poses.min(axis=0) - mean, poses.max(axis=0) - mean
         weights = blend_weights([targets - np.clip(targets - e, *limits) for e in errors])
-        blended = np.tensordot(weights, np.array(errors), axes=1)
-        count = len(bases)
-        linear = sum(
-            weight * basis @ ridge.weights
-            for weight, basis, ridge in zip(weights[count:], bases, ridges, strict=True)
-        )
+
+        linear = np.zeros((len(centre), len(mean)))
+        for p, weight, ridge in zip(
+            self.ridge_powers, weights[len(processes) :], ridges, strict=True
+        ):
+            linear += weight * (bases[p] @ ridge.weights)
         made = BlendMap(
-            labelled.X,
-            labelled.Y,
-            centre,
-            np.array(bases),
-            np.array(thetas),
-            weights[:count],
-            np.asarray(linear),
-            mean,
-            shrinkage(poses, blended),
+            X=labelled.X,
+            Y=labelled.Y,
+            centre=centre,
+            bases=np.array([bases[p] for p in self.process_powers]),
+            thetas=np.array([process.theta for process in processes]),
+            weights=weights[: len(processes)],
+            linear=linear,
+            mean=mean,
+            shrink=shrinkage(poses, np.tensordot(weights, np.array(errors), axes=1)),
         )
-        names = [f"{kind}, whitened {p:g}" for kind in ("gpr-linear", "ridge") for p in POWERS]
-        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
+        names = [f"gpr-linear, whitened {p:g}" for p in self.process_powers]
+        names += [f"ridge, whitened {p:g}" for p in self.ridge_powers]
         shares = {f"weight of {n}": float(w) for n, w in zip(names, weights, strict=True)}
+        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
         return made, {**counts, **shares}
+
+
+class SemiSupervisedGPR(Blend):
+    """One Gaussian process, on half-whitened features."""
+
+    process_powers = (0.5,)
+    ridge_powers = ()
+
+
+class Auto(Blend):
+    """Gaussian processes and ridges, on three kinds of features."""
+
+    process_powers = ridge_powers = (0.0, 0.25, 0.5)
+
+
+def _basis(frames: FloatArray, power: float) -> FloatArray:
+    """Of the features; without whitening the source as it is, noise and all."""
+    return whitening(frames, power) if power else np.eye(frames.shape[1])
+
+
+def _process(features: FloatArray, targets: FloatArray) -> ProcessMap:
+    kernel = maximise_likelihood(features, targets).kernel
+    return ProcessMap(features, targets, np.array([*kernel.theta, kernel.linear]))
 
 
 def blend_weights(errors: Sequence[FloatArray]) -> FloatArray:

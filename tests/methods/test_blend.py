@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from facert.methods.base import Labelled, Unlabelled
+from facert.methods.blend import SemiSupervisedGPR, blend_weights
 from facert.methods.features import noise_variance, whitening
-from facert.methods.semisupervised import SemiSupervisedGPR, shrinkage
+from facert.methods.linear import leave_one_out_ridge
+from facert.methods.shrinkage import shrinkage
 from facert.settings import Settings
 
 
@@ -76,3 +78,39 @@ def test_more_unlabelled_frames_and_poses_help():
         return np.sqrt(np.mean((method.predict(X[212:]).Y - Y[212:]) ** 2))
 
     assert error(200) < 0.95 * error(0)
+
+
+def test_weights_are_shares():
+    errors = list(np.random.default_rng(0).normal(size=(4, 10, 3)))
+    weights = blend_weights(errors)
+
+    assert weights.sum() == pytest.approx(1.0)
+    assert (weights >= 0).all()
+
+
+def test_experts_that_are_alike_share_alike_and_a_far_better_one_takes_all():
+    error = np.random.default_rng(0).normal(size=(10, 3))
+
+    np.testing.assert_allclose(blend_weights([error, error, error]), 1 / 3)
+    np.testing.assert_allclose(blend_weights([0.01 * error, error]), [1.0, 0.0], atol=1e-3)
+
+
+def test_experts_that_err_in_opposite_ways_are_mixed():
+    error = np.random.default_rng(0).normal(size=(10, 3))
+
+    np.testing.assert_allclose(blend_weights([error, -error]), [0.5, 0.5])
+
+
+def test_ridge_knows_what_it_misses_of_a_row_that_is_left_out():
+    rng = np.random.default_rng(1)
+    X, Y = rng.normal(size=(15, 6)), rng.normal(size=(15, 2))
+    found = leave_one_out_ridge(X, Y)
+    penalties = found.penalties * np.sum(X * X) / len(X)
+
+    for row in range(len(X)):
+        kept = np.arange(len(X)) != row
+        for control, penalty in enumerate(penalties):
+            gram = X[kept].T @ X[kept] + penalty * np.eye(6)
+            weights = np.linalg.solve(gram, X[kept].T @ Y[kept, control])
+            missed = Y[row, control] - X[row] @ weights
+            assert found.left_out_errors[row, control] == pytest.approx(missed, rel=1e-6)
