@@ -1,4 +1,4 @@
-"""The nouns: what a take, its source, its controls and a rig are.
+"""The nouns: what a take, its source, its controls, a mesh, its motion and a rig are.
 
 Plain frozen dataclasses. They check themselves when they are made and raise `InputError` naming
 the field by its path in the HDF5 layout; they know nothing of files. Arrays are float64 and are
@@ -7,26 +7,40 @@ made read-only, so that a take can be shared without fear.
 
 from __future__ import annotations
 
-import re
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from facert.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    checked_colours,
+    checked_names,
+    float_array,
+    frozen,
+    require_plain,
+    require_time,
+    set_fields,
+)
 from facert.errors import InputError
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+__all__ = [
+    "BoolArray",
+    "Controls",
+    "FloatArray",
+    "IntArray",
+    "Mesh",
+    "MeshSequence",
+    "Rig",
+    "Source",
+    "SourceKind",
+    "Take",
+]
 
 SourceKind = Literal["markers", "weights"]
-_Scalar = TypeVar("_Scalar", bound=np.generic)
-
-# HDF5 cannot hold NUL, UTF-8 no half of a pair; control characters and line ends upset a terminal.
-_FORBIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +65,7 @@ class Source:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        values = _float_array(self.values, "/source")
+        values = float_array(self.values, "/source")
         if values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] != 3):
             raise InputError(
                 "/source",
@@ -60,7 +74,7 @@ class Source:
                 "Write markers with three coordinates, or weights as a matrix.",
             )
         path = "/source/markers" if values.ndim == 3 else "/source/weights"
-        names = _names(self.names, values.shape[1], "/source/names")
+        names = checked_names(self.names, values.shape[1], "/source/names")
         if np.isinf(values).any():
             raise InputError(
                 path,
@@ -77,7 +91,7 @@ class Source:
                 "NaN or invalid everywhere",
                 "Check the export.",
             )
-        _set(self, values=_frozen(values), names=names)
+        set_fields(self, values=frozen(values), names=names)
 
     @property
     def valid(self) -> BoolArray:
@@ -116,11 +130,11 @@ class Controls:
     limits: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        names = _names(self.names, len(self.names), "/target/names")
-        _set(self, names=names)
+        names = checked_names(self.names, len(self.names), "/target/names")
+        set_fields(self, names=names)
         if self.limits is None:
             return
-        limits = _float_array(self.limits, "/target/limits")
+        limits = float_array(self.limits, "/target/limits")
         if limits.shape != (len(names), 2) or not (limits[:, 0] <= limits[:, 1]).all():
             raise InputError(
                 "/target/limits",
@@ -128,7 +142,7 @@ class Controls:
                 f"shape {limits.shape}" if limits.shape != (len(names), 2) else "low > high or NaN",
                 "Give the lowest and the highest value of each control.",
             )
-        _set(self, limits=_frozen(limits))
+        set_fields(self, limits=frozen(limits))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,26 +189,14 @@ class Take:
     created_by: str = field(default="")
 
     def __post_init__(self) -> None:
-        time = _float_array(self.time, "/time")
+        time = float_array(self.time, "/time")
         frames = len(self.source.values)
-        if time.shape != (frames,):
-            raise InputError(
-                "/time", f"{frames} seconds", f"shape {time.shape}", "Give one time a frame."
-            )
-        if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-            raise InputError(
-                "/time",
-                "finite, strictly rising seconds",
-                "a step back, a repeat or NaN",
-                "Sort the frames by time and drop repeats.",
-            )
-        if not (np.isfinite(self.fps) and self.fps > 0):
-            raise InputError("fps", "a positive number", f"{self.fps}", "Set the frame rate.")
+        require_time(time, frames, self.fps)
         for name in ("units", "start_timecode", "up_axis", "created_by"):
-            _require_plain(getattr(self, name), f"attribute {name}")
-        _set(self, time=_frozen(time))
+            require_plain(getattr(self, name), f"attribute {name}")
+        set_fields(self, time=frozen(time))
         for name, rows in (("params", frames), ("std", frames), ("animation", None)):
-            _set(self, **{name: self._poses(name, rows)})
+            set_fields(self, **{name: self._poses(name, rows)})
 
     def _poses(self, name: str, rows: int | None) -> FloatArray | None:
         """Check one of the pose matrices and return it as float64."""
@@ -206,7 +208,7 @@ class Take:
             raise InputError(
                 "/target/names", "the controls' names", "none", "Write /target/names (P,)."
             )
-        poses = _float_array(value, path)
+        poses = float_array(value, path)
         expected = (len(poses) if rows is None else rows, len(self.controls.names))
         if poses.shape != expected:
             raise InputError(
@@ -225,7 +227,7 @@ class Take:
                 row,
                 "Pose every control of the frame, or none.",
             )
-        return _frozen(poses)
+        return frozen(poses)
 
     def __len__(self) -> int:
         """Number of frames T."""
@@ -237,6 +239,92 @@ class Take:
         if self.params is None:
             return np.empty(0, dtype=np.int64)
         return np.flatnonzero(~np.isnan(self.params[:, 0])).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in space.
+
+    Parameters
+    ----------
+    vertices : array, shape (V, 3)
+        In `units`.
+    faces : array of int, shape (F, 3)
+        Triangles, anticlockwise as seen from outside.
+    units : str
+        Unit of length; empty when unknown.
+    colours : array, shape (V, 3), optional
+        Red, green and blue of every vertex, 0 to 1; for pictures only.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes, numbers that are not finite, or faces that name no vertex.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    units: str = ""
+    colours: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        vertices = float_array(self.vertices, "/neutral")
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise InputError("/neutral", "(V, 3)", f"{vertices.shape}", "Give vertex positions.")
+        if not np.isfinite(vertices).all():
+            raise InputError("/neutral", "finite numbers", "NaN or infinity", "Check the export.")
+        require_plain(self.units, "attribute units")
+        faces = np.asarray(self.faces)
+        if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+            raise InputError(
+                "/faces", "integers (F, 3)", f"{faces.dtype} {faces.shape}", "Give triangles."
+            )
+        if faces.size and not (0 <= faces.min() and faces.max() < len(vertices)):
+            raise InputError(
+                "/faces",
+                f"vertex indices 0 to {len(vertices) - 1}",
+                f"{faces.min()} to {faces.max()}",
+                "Check the export.",
+            )
+        colours = checked_colours(self.colours, len(vertices))
+        set_fields(self, vertices=frozen(vertices), faces=frozen(faces.astype(np.int64)))
+        set_fields(self, colours=colours)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSequence:
+    """A mesh in motion, whose frames are fetched when they are needed: it may be large.
+
+    Parameters
+    ----------
+    neutral : Mesh
+        Rest pose.
+    time : array, shape (T,)
+        Seconds, rising.
+    fetch : callable
+        From frame numbers, shape (n,), to vertices (n, V, 3); NaN where a frame has no pose.
+    fps : float
+        Nominal frames a second.
+    """
+
+    neutral: Mesh
+    time: FloatArray
+    fetch: Callable[[IntArray], FloatArray]
+    fps: float = 30.0
+
+    def __post_init__(self) -> None:
+        time = float_array(self.time, "/time")
+        require_time(time, len(time), self.fps)
+        set_fields(self, time=frozen(time))
+
+    def __len__(self) -> int:
+        """Number of frames T."""
+        return len(self.time)
+
+    def batches(self, size: int = 64) -> Iterator[FloatArray]:
+        """All frames in order as vertices (n, V, 3), at most `size` at once."""
+        for start in range(0, len(self), size):
+            yield self.fetch(np.arange(start, min(start + size, len(self))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,101 +355,27 @@ class Rig:
     colours: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        neutral = _float_array(self.neutral, "/neutral")
-        shapes = _float_array(self.shapes, "/shapes")
-        if neutral.ndim != 2 or neutral.shape[1] != 3 or not len(neutral):
-            raise InputError("/neutral", "(V, 3)", f"{neutral.shape}", "Give vertex positions.")
-        if shapes.shape[1:] != neutral.shape:
+        mesh = Mesh(self.neutral, self.faces, self.units, self.colours)
+        shapes = float_array(self.shapes, "/shapes")
+        if shapes.shape[1:] != mesh.vertices.shape:
             raise InputError(
                 "/shapes",
-                f"(P, {len(neutral)}, 3)",
+                f"(P, {len(mesh.vertices)}, 3)",
                 f"{shapes.shape}",
                 "Give one displacement a control and vertex.",
             )
-        if not (np.isfinite(neutral).all() and np.isfinite(shapes).all()):
-            raise InputError(
-                "/neutral, /shapes", "finite numbers", "NaN or infinity", "Check the export."
-            )
-        names = _names(self.names, len(shapes), "/names")
-        _require_plain(self.units, "attribute units")
-        faces = np.asarray(self.faces)
-        if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-            raise InputError(
-                "/faces", "integers (F, 3)", f"{faces.dtype} {faces.shape}", "Give triangles."
-            )
-        if faces.size and not (0 <= faces.min() and faces.max() < len(neutral)):
-            raise InputError(
-                "/faces",
-                f"vertex indices 0 to {len(neutral) - 1}",
-                f"{faces.min()} to {faces.max()}",
-                "Check the export.",
-            )
-        _set(
-            self,
-            neutral=_frozen(neutral),
-            shapes=_frozen(shapes),
-            names=names,
-            faces=_frozen(faces.astype(np.int64)),
-            colours=self._colours(len(neutral)),
-        )
+        if not np.isfinite(shapes).all():
+            raise InputError("/shapes", "finite numbers", "NaN or infinity", "Check the export.")
+        names = checked_names(self.names, len(shapes), "/names")
+        set_fields(self, neutral=mesh.vertices, faces=mesh.faces, colours=mesh.colours)
+        set_fields(self, shapes=frozen(shapes), names=names)
 
-    def _colours(self, vertices: int) -> FloatArray | None:
-        if self.colours is None:
-            return None
-        colours = _float_array(self.colours, "/colours")
-        if colours.shape != (vertices, 3) or not ((colours >= 0) & (colours <= 1)).all():
-            raise InputError(
-                "/colours",
-                f"({vertices}, 3) between 0 and 1",
-                f"shape {colours.shape}, or values outside",
-                "Give red, green and blue of every vertex, or leave the colours out.",
-            )
-        return _frozen(colours)
+    @property
+    def mesh(self) -> Mesh:
+        """The rest pose alone."""
+        return Mesh(self.neutral, self.faces, self.units, self.colours)
 
     def deform(self, params: FloatArray) -> FloatArray:
         """Vertices (T, V, 3) for parameters (T, P)."""
         flat = self.shapes.reshape(len(self.shapes), -1)
         return self.neutral + (np.asarray(params) @ flat).reshape(-1, *self.neutral.shape)
-
-
-def _set(instance: object, **values: object) -> None:
-    """Set fields of a frozen dataclass while it is being made."""
-    for name, value in values.items():
-        object.__setattr__(instance, name, value)
-
-
-def _frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
-    array.setflags(write=False)
-    return array
-
-
-def _float_array(value: ArrayLike, path: str) -> FloatArray:
-    """A float64 array; a copy, so that freezing it never touches the caller's."""
-    array = np.array(value)
-    if array.dtype.kind not in "fiu" or not array.size:
-        raise InputError(
-            path, "numbers", f"{array.dtype} {array.shape}", "Write a numeric array with data."
-        )
-    return array.astype(np.float64)
-
-
-def _names(names: Sequence[str], count: int, path: str) -> tuple[str, ...]:
-    """Check that there is one name a column, each plain text, none empty and none twice."""
-    names = tuple(str(name) for name in names)
-    if len(names) != count or not names:
-        raise InputError(path, f"{count} names", f"{len(names)}", "Give one name a column.")
-    doubled = [name for name, count in Counter(names).items() if count > 1]
-    if doubled or "" in names:
-        found = f"{doubled[0]!r} twice" if doubled else "an empty name"
-        raise InputError(path, "names that are all different", found, "Rename one of them.")
-    for name in names:
-        _require_plain(name, path)
-    return names
-
-
-def _require_plain(text: str, path: str) -> None:
-    """Refuse text that no file can hold, or that could upset a terminal."""
-    if _FORBIDDEN.search(text):
-        raise InputError(
-            path, "text without control characters", repr(text[:60]), "Write plain text."
-        )

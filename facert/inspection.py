@@ -1,4 +1,4 @@
-"""What is in a take or a rig: the facts that a user wants to see before any training."""
+"""What is in a take, a rig or a mesh sequence: the facts to see before any work."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, Rig, Source, Take
+from facert.data import BoolArray, FloatArray, MeshSequence, Rig, Source, Take
 
 STILL = 1e-6
 """A channel is active when its range exceeds this share of the widest range of all channels."""
@@ -85,15 +85,51 @@ class RigSummary:
     still: tuple[str, ...]
 
 
-def summarise(found: Take | Rig) -> TakeSummary | RigSummary:
-    """Sum up a take or a rig.
+@dataclass(frozen=True)
+class MeshSequenceSummary:
+    """A mesh in motion; `extents` are width, height and depth of the neutral in its units."""
+
+    kind: str
+    frames: int
+    seconds: float
+    fps: float
+    units: str
+    vertices: int
+    triangles: int
+    extents: tuple[float, ...]
+    largest_displacement: float
+
+
+Summary = TakeSummary | RigSummary | MeshSequenceSummary
+
+
+def summarise(found: Take | Rig | MeshSequence) -> Summary:
+    """Sum up a take, a rig or a mesh sequence.
 
     Returns
     -------
-    TakeSummary or RigSummary
+    TakeSummary, RigSummary or MeshSequenceSummary
         Plain numbers, text and tuples: `dataclasses.asdict` gives what JSON can hold.
     """
+    if isinstance(found, MeshSequence):
+        return _summarise_sequence(found)
     return _summarise_rig(found) if isinstance(found, Rig) else _summarise_take(found)
+
+
+def _summarise_sequence(sequence: MeshSequence) -> MeshSequenceSummary:
+    neutral = sequence.neutral
+    reach = (np.linalg.norm(batch - neutral.vertices, axis=2) for batch in sequence.batches())
+    return MeshSequenceSummary(
+        kind="mesh sequence",
+        frames=len(sequence),
+        seconds=float(sequence.time[-1] - sequence.time[0]),
+        fps=float(sequence.fps),
+        units=neutral.units,
+        vertices=len(neutral.vertices),
+        triangles=len(neutral.faces),
+        extents=tuple(np.ptp(neutral.vertices, axis=0).tolist()),
+        largest_displacement=float(max(lengths.max() for lengths in reach)),
+    )
 
 
 def _summarise_take(take: Take) -> TakeSummary:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data import Controls, FloatArray, IntArray, Rig, Take
-from facert.names import control_groups, match
+from facert.names import control_groups, shape_drivers
 
 
 def rms(errors: FloatArray) -> float:
@@ -150,10 +150,10 @@ def vertex_gram(rig: Rig, controls: Controls) -> FloatArray:
     Raises
     ------
     InputError
-        When the rig lacks one of the controls.
+        When the rig lacks a shape for one of them, see `facert.names.shape_drivers`.
     """
-    chosen = match(controls.names, rig.names, "/names")
-    shapes = rig.shapes[chosen].reshape(len(chosen), -1)
+    drivers = shape_drivers(controls.names, rig.names)
+    shapes = drivers @ rig.shapes.reshape(len(rig.names), -1)
     return np.asarray(shapes @ shapes.T / len(rig.neutral))
 
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import IntArray
+from facert.data import FloatArray, IntArray
 from facert.errors import InputError
 
 _SHAPES = """
@@ -163,6 +163,69 @@ def _require_different(
         f"only {among[shared[0]]!r}",
         "Add the missing one, or rename it.",
     )
+
+
+def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
+    """Which of a rig's shapes each control drives, whatever the spelling of either.
+
+    A control drives the shape of its name; where the rig has a left and a right half of it
+    instead, both.
+
+    Parameters
+    ----------
+    controls : sequence of str, length P
+    shapes : sequence of str, length K
+
+    Returns
+    -------
+    array, shape (P, K)
+        1 where a control drives a shape, else 0: poses (n, P) times this are settings of the rig.
+
+    Raises
+    ------
+    InputError
+        When the rig has no shape for a control, or one shape for two of them.
+    """
+    index = NameIndex(shapes)
+    driven = [_driven(control, index) for control in controls]
+    unknown = [name for name, found in zip(controls, driven, strict=True) if not found]
+    if unknown:
+        near = nearest(unknown[0], shapes)
+        hint = f" (did you mean {near!r}?)" if near else ""
+        raise InputError(
+            "/target/names",
+            "controls that the rig has a shape for",
+            f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all",
+            "Give the rig of this take's character.",
+        )
+    drivers = np.zeros((len(controls), len(shapes)))
+    for control, found in enumerate(driven):
+        drivers[control, found] = 1.0
+    _require_one_driver(drivers, controls, shapes)
+    return drivers
+
+
+def _driven(control: str, index: NameIndex) -> list[int]:
+    """The shape of a control, or its left and right halves."""
+    whole = index.find(control)
+    if whole is not None:
+        return [whole]
+    halves = [index.find(f"{control}_{side}") for side in "LR"]
+    return [half for half in halves if half is not None] if None not in halves else []
+
+
+def _require_one_driver(
+    drivers: FloatArray, controls: Sequence[str], shapes: Sequence[str]
+) -> None:
+    twice = np.flatnonzero(drivers.sum(axis=0) > 1)
+    if len(twice):
+        first, second = (controls[index] for index in np.flatnonzero(drivers[:, twice[0]])[:2])
+        raise InputError(
+            "/target/names",
+            "controls with a shape each",
+            f"{first!r} and {second!r} for {shapes[twice[0]]!r}",
+            "Leave out one of them, or give the rig of this take's character.",
+        )
 
 
 def control_groups(names: Sequence[str]) -> dict[str, IntArray]:

@@ -73,8 +73,19 @@ def test_vertex_errors_are_those_of_the_deformed_mesh():
     distances = np.linalg.norm(rig.deform(poses) - rig.deform(truth), axis=2)
     expected = np.sqrt(np.mean(distances**2, axis=1))
     errors = (poses - truth)[:, ::-1]  # in the order a, b, c, d
-    gram = vertex_gram(rig, Controls(tuple("abcd")))
+    gram = vertex_gram(rig, Controls(tuple("ABCD")))
     assert vertex_errors(errors, gram) == pytest.approx(expected)
     found = score(errors, np.arange(6), np.ones(4), gram)
     assert found.vertex_rms == pytest.approx(expected.mean())
     assert found.vertex_p95 == pytest.approx(np.percentile(expected, 95))
+
+
+def test_a_control_without_a_side_moves_both_halves_of_its_shape():
+    rng = np.random.default_rng(0)
+    names = ("brow_R", "jaw", "brow_L", "other")
+    rig = Rig(np.zeros((5, 3)), rng.normal(size=(4, 5, 3)), names, np.array([[0, 1, 2]]))
+    error = np.array([[0.3, -0.2]])  # of jaw and brow
+    moved = rig.deform(np.array([[-0.2, 0.3, -0.2, 0.0]]))[0]
+    expected = np.sqrt(np.mean(np.sum(moved**2, axis=1)))
+    gram = vertex_gram(rig, Controls(("jaw", "Brow")))
+    assert vertex_errors(error, gram) == pytest.approx([expected])

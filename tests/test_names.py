@@ -15,6 +15,7 @@ from facert.names import (
     control_groups,
     match,
     nearest,
+    shape_drivers,
 )
 
 
@@ -81,6 +82,38 @@ def test_numbers_are_found_in_other_spellings():
 def test_one_name_never_stands_for_two(wanted):
     with pytest.raises(InputError, match=f"'{wanted[0]}' and '{wanted[1]}', found only 'smile"):
         match(wanted, ["smile_L", "jaw"], "/source/names")
+
+
+@given(st.permutations(ARKIT_NAMES))
+def test_controls_drive_the_shapes_of_their_names_whatever_the_spelling(names):
+    upper = [name[0].upper() + name[1:] for name in ARKIT_NAMES]
+    drivers = shape_drivers(upper, names)
+    assert (drivers @ np.arange(61)).tolist() == [names.index(name) for name in ARKIT_NAMES]
+    assert drivers.sum() == 61
+
+
+def test_a_control_without_a_side_drives_both_halves():
+    shapes = ["browInnerUp_L", "jawOpen", "browInnerUp_R", "browInner"]
+    drivers = shape_drivers(["BrowInnerUp", "jaw_open"], shapes)
+    assert drivers.tolist() == [[1, 0, 1, 0], [0, 1, 0, 0]]
+
+
+def test_the_whole_shape_comes_before_its_halves():
+    assert shape_drivers(["puff"], ["puff_L", "puff_R", "puff"]).tolist() == [[0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("controls", "message"),
+    [
+        (["up", "wider"], r"found 'wider' \(did you mean 'wide'\?\), 1 unknown in all"),
+        (["up", "lean"], "found 'lean', 1 unknown"),  # one half is not the whole
+        (["up", "Up"], "found 'up' and 'Up' for 'up'"),
+        (["puff", "puffLeft"], "found 'puff' and 'puffLeft' for 'puff_L'"),
+    ],
+)
+def test_every_control_has_shapes_of_its_own(controls, message):
+    with pytest.raises(InputError, match=f"/target/names: .*{message}"):
+        shape_drivers(controls, ["up", "wide", "lean_L", "puff_L", "puff_R"])
 
 
 @given(st.lists(st.text(min_size=1), unique=True, min_size=1))

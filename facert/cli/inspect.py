@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def command(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A take, a rig or a model, in any format.")
+        Path, typer.Argument(metavar="FILE", help="A take, a rig, a mesh sequence or a model.")
     ],
     target: Annotated[
         str | None, typer.Option(help="Which of several targets of an .npz track.")
@@ -46,7 +46,11 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 
     from facert.inspection import summarise
     from facert.io.formats import read_any
+    from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
 
+    if holds_mesh_sequence(path):
+        with open_mesh_sequence(path) as sequence:
+            return asdict(summarise(sequence))
     return asdict(summarise(read_any(path, target=target, shapes=shapes, fps=None)))
 
 

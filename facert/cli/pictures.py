@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 ENDINGS = (".png", ".pdf", ".svg")
 
 
-def require_picture_name(path: Path, overwrite: bool) -> None:
+def require_picture_name(path: Path, overwrite: bool, endings: tuple[str, ...] = ENDINGS) -> None:
     """Refuse a name that cannot be written to, before any work is done."""
-    if path.suffix.lower() not in ENDINGS:
+    if path.suffix.lower() not in endings:
         raise InputError(
             "output",
-            f"a name that ends in {', '.join(ENDINGS)}",
+            f"a name that ends in {', '.join(endings)}",
             f"{path.suffix!r}",
             "Give another name.",
             where=str(path),

@@ -1,54 +1,145 @@
-"""``facert render``: a picture of the character's face."""
+"""``facert render``: a sheet of pictures, or a clip, of faces side by side."""
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from facert.cli import console
 
+if TYPE_CHECKING:
+    from facert.data import Take
+    from facert.view.faces import Face
+
 FACES = 6
+CLIP_RATES = {".mp4": 30.0, ".gif": 20.0}
+MOST = 6
 
 
 def command(
-    take_path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take with poses.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT.png", help="The picture.")],
-    rig_path: Annotated[Path, typer.Option("--rig", help="The character's rig.")],
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A take with poses, or a mesh sequence.")
+    ],
+    output: Annotated[
+        Path,
+        typer.Argument(metavar="OUT", help="A sheet (.png, .pdf, .svg) or a clip (.mp4, .gif)."),
+    ],
+    rig_path: Annotated[
+        Path | None, typer.Option("--rig", help="The character's rig, for a take.")
+    ] = None,
     truth_path: Annotated[
-        Path | None, typer.Option("--truth", help="A take with the true poses.")
+        Path | None, typer.Option("--truth", help="The true poses, or the true mesh sequence.")
+    ] = None,
+    beside: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Another face of the same frames; again for more."),
     ] = None,
     frames: Annotated[
-        str, typer.Option(help="For instance 0,30,60; by default some that differ well.")
+        str,
+        typer.Option(help="For instance 0,30,60 for a sheet; 100..400 for a part of the take."),
     ] = "",
+    size: Annotated[int, typer.Option(min=64, max=2048, help="Pixels of a face a side.")] = 320,
+    fps: Annotated[
+        float | None, typer.Option(min=1, max=120, help="Of a clip; by default 30, GIF 20.")
+    ] = None,
     target: Annotated[
         str | None, typer.Option(help="Which of several targets of .npz takes.")
     ] = None,
     shapes: Annotated[
         str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
 ) -> None:
-    """Draw faces: markers, the character with the take's poses, and with the true ones."""
-    from facert.cli.pictures import require_picture_name, save_picture
+    """Draw faces: a take with its rig or a mesh sequence, beside the truth and others.
+
+    A sheet shows some frames, by default such as differ well; a clip shows the motion.
+    """
+    from facert.cli.faces import open_face
+    from facert.cli.pictures import ENDINGS, require_picture_name
     from facert.errors import reading
-    from facert.io.formats import read_rig_file, read_take_file
-    from facert.view.render import choose_frames, render_faces, require_poses
+    from facert.io.formats import read_rig_file
 
-    require_picture_name(output, overwrite)
-    take, rig = read_take_file(take_path, target), read_rig_file(rig_path, shapes)
-    truth = read_take_file(truth_path, target) if truth_path else None
-    with reading(take_path):
-        chosen = _parse(frames) if frames else choose_frames(require_poses(take), FACES)
-        figure = render_faces(take, rig, chosen, truth)
-    save_picture(figure, output, overwrite)
-    console.out.print(f"{output}: frames {', '.join(map(str, chosen))}", markup=False)
+    require_picture_name(output, overwrite, (*ENDINGS, *CLIP_RATES))
+    wanted, others = _parse(frames), [(one, one.stem) for one in beside or []]
+    others += [(truth_path, "truth")] if truth_path else []
+    if len(others) >= MOST:
+        raise typer.BadParameter(f"at most {MOST} faces fit on a picture")
+    rig = read_rig_file(rig_path, shapes) if rig_path else None
+    with ExitStack() as stack, reading(path):
+        face, take = open_face(stack, path, rig, target)
+        faces = [face] + [open_face(stack, one, rig, target, label)[0] for one, label in others]
+        if output.suffix.lower() not in CLIP_RATES:
+            said = _sheet(faces, take, wanted, size, output, overwrite)
+        else:
+            said = _clip(faces, wanted, size, fps, output, overwrite)
+    console.out.print(f"{output}: {said}", markup=False)
 
 
-def _parse(frames: str) -> list[int]:
-    """The numbers of a list such as ``0,30,60``."""
+def _sheet(
+    faces: list[Face],
+    take: Take | None,
+    wanted: list[int] | range | None,
+    size: int,
+    output: Path,
+    overwrite: bool,
+) -> str:
+    """Draw some frames of every face; return which."""
+    from facert.cli.pictures import save_picture
+    from facert.view.faces import choose_frames, outline, require_part, require_poses
+    from facert.view.render import render_sheet
+
+    if not isinstance(wanted, list):
+        part = range(len(faces[0].motion)) if wanted is None else wanted
+        require_part(part, len(faces[0].motion))
+        poses = require_poses(take) if take else outline(faces[0].motion)
+        chosen = choose_frames(poses[part.start : part.stop], FACES)
+        wanted = [part.start + frame for frame in chosen]
+    save_picture(render_sheet(faces, wanted, take, size), output, overwrite)
+    return f"frames {', '.join(map(str, wanted))}"
+
+
+def _clip(
+    faces: list[Face],
+    wanted: list[int] | range | None,
+    size: int,
+    fps: float | None,
+    output: Path,
+    overwrite: bool,
+) -> str:
+    """Draw every face in motion; return how long."""
+    from rich.progress import track
+
+    from facert.io.video import write_clip
+    from facert.view.clip import draw_clip, sampled_frames
+    from facert.view.faces import require_part
+
+    if isinstance(wanted, list):
+        raise typer.BadParameter("a clip shows a part of the take: give it as in 100..400")
+    motion = faces[0].motion
+    part = range(len(motion)) if wanted is None else wanted
+    require_part(part, len(motion))
+    rate = fps or min(CLIP_RATES[output.suffix.lower()], motion.fps)
+    chosen = sampled_frames(motion.time, part, rate)
+    pictures = draw_clip(faces, chosen, size + size % 2)
+    hidden = not console.err.is_terminal
+    shown = track(
+        pictures, "drawing", len(chosen), console=console.err, transient=True, disable=hidden
+    )
+    write_clip(iter(shown), output, rate, overwrite)
+    return f"{len(chosen)} frames, {len(chosen) / rate:.1f} s at {rate:g} frames/s"
+
+
+def _parse(frames: str) -> list[int] | range | None:
+    """The numbers of a list such as ``0,30,60``, or the part ``100..400``; None if not given."""
+    if not frames:
+        return None
     try:
+        if ".." in frames:
+            first, last = map(int, frames.split(".."))
+            return range(first, last + 1)
         return [int(frame) for frame in frames.split(",")]
     except ValueError:
-        raise typer.BadParameter("give frame numbers with commas, as in 0,30,60") from None
+        raise typer.BadParameter("give numbers as in 0,30,60, or a part as in 100..400") from None

@@ -1,4 +1,6 @@
-"""The one table of file formats: what a name's ending means.
+"""The one table of file formats for takes and rigs: what a name's ending means.
+
+Meshes at rest and in motion have rooms of their own: `mesh`, `mesh_sequence`, `glb`.
 
 =================  =================================  ==========================================
 ending             read                               written

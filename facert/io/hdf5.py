@@ -65,6 +65,15 @@ class GuardedFile:
         """Read a dataset of booleans, or of integers that stand for them."""
         return self._read(path, "biu", "booleans").astype(np.bool_)
 
+    def rows(self, path: str) -> Rows:
+        """A dataset of integers or floats that is read a few rows at a time; it may be large."""
+        dataset = self._dataset(path)
+        _check_layout(dataset, path)
+        if _dtype(dataset, path).kind not in "iuf" or not dataset.ndim:
+            raise _unexpected(path, "rows of numbers", _describe(dataset))
+        _check_size(dataset, path, dataset.shape[1:])
+        return Rows(dataset, path)
+
     def names(self, path: str) -> tuple[str, ...]:
         """Read a list of names: UTF-8 strings of fixed or variable length."""
         dataset = self._dataset(path)
@@ -174,6 +183,28 @@ class GuardedFile:
         return value.item() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
+class Rows:
+    """A dataset in an open file, read a few rows at a time."""
+
+    def __init__(self, dataset: h5py.Dataset, path: str) -> None:
+        self._dataset, self._path = dataset, path
+        self.shape: tuple[int, ...] = dataset.shape
+
+    def read(self, rows: IntArray) -> FloatArray:
+        """Some rows, (n, ...), as float64.
+
+        Raises
+        ------
+        InputError
+            When the data are damaged.
+        """
+        first, count = (int(rows[0]), len(rows)) if len(rows) else (0, 0)
+        if np.array_equal(rows, np.arange(first, first + count)):
+            block = _guarded_read(self._dataset, self._path, slice(first, first + count))
+            return np.asarray(block, dtype=np.float64)
+        return np.concatenate([self.read(rows[i : i + 1]) for i in range(count)])
+
+
 @contextmanager
 def open_guarded(path: Path) -> Iterator[GuardedFile]:
     """Open a foreign HDF5 file for reading; errors raised inside name the file.
@@ -196,6 +227,14 @@ def open_guarded(path: Path) -> Iterator[GuardedFile]:
             yield GuardedFile(file)
 
 
+def stated_format(path: Path) -> str:
+    """What an HDF5 file says that it is; empty for a file of another kind, or none."""
+    if not h5py.is_hdf5(path):
+        return ""
+    with open_guarded(path) as file:
+        return file.text_attribute("format")
+
+
 class NewFile:
     """Writing access to a new HDF5 file; the same data give the same bytes."""
 
@@ -207,6 +246,15 @@ class NewFile:
         packing = {"compression": "gzip", "shuffle": True} if values.size else {}
         self._file.create_dataset(path, data=values, **packing)
 
+    def rows(self, path: str, shape: tuple[int, ...]) -> NewRows:
+        """A float32 dataset that is filled row by row.
+
+        Its compression is the quickest one: of a face in motion, gzip saves 5 % more bytes than
+        lzf and takes three times as long.
+        """
+        packing = {"chunks": (1, *shape[1:]), "compression": "lzf", "shuffle": True}
+        return NewRows(self._file.create_dataset(path, shape, np.float32, **packing))
+
     def names(self, path: str, names: Sequence[str]) -> None:
         """Write a list of names as UTF-8 strings."""
         self._file.create_dataset(path, data=list(names), dtype=h5py.string_dtype())
@@ -215,6 +263,23 @@ class NewFile:
         """Write an attribute of the root; empty text is left out."""
         if value != "":
             self._file.attrs[name] = value
+
+
+class NewRows:
+    """A new dataset that is filled from the first row to the last, a batch at a time."""
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self._dataset = dataset
+        self.shape: tuple[int, ...] = dataset.shape
+        self.filled = 0
+
+    def append(self, values: FloatArray) -> None:
+        """Write the next rows, (n, ...)."""
+        end = self.filled + len(values)
+        if values.shape[1:] != self.shape[1:] or end > self.shape[0]:
+            raise ValueError(f"rows {self.filled} to {end} of {values.shape} into {self.shape}")
+        self._dataset[self.filled : end] = values.astype(np.float32)  # HDF5 would be slower at it
+        self.filled = end
 
 
 @contextmanager
@@ -235,7 +300,13 @@ def create(path: Path, format_name: str, version: int, overwrite: bool) -> Itera
 
 
 def _check_storage(dataset: h5py.Dataset, path: str) -> None:
-    """Refuse data that lie in other files, need plug-ins, or are declared too large."""
+    """Refuse what is to be read at once and is not plain data, or is declared too large."""
+    _check_layout(dataset, path)
+    _check_size(dataset, path, dataset.shape)
+
+
+def _check_layout(dataset: h5py.Dataset, path: str) -> None:
+    """Refuse data that lie in other files or need plug-ins."""
     properties = dataset.id.get_create_plist()
     if dataset.is_virtual or properties.get_external_count():
         raise InputError(
@@ -255,7 +326,11 @@ def _check_storage(dataset: h5py.Dataset, path: str) -> None:
         )
     if dataset.shape is None:
         raise _unexpected(path, "an array", "an empty dataspace")
-    if max(math.prod(dataset.shape), math.prod(dataset.chunks or ())) > MAX_VALUES:
+
+
+def _check_size(dataset: h5py.Dataset, path: str, shape: tuple[int, ...]) -> None:
+    """Refuse a declared size that would fill the memory when an array of `shape` is read."""
+    if max(math.prod(shape), math.prod(dataset.chunks or ())) > MAX_VALUES:
         raise _unexpected(path, f"at most {MAX_VALUES} values", f"shape {dataset.shape}")
 
 

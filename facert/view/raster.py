@@ -8,20 +8,25 @@ import numpy as np
 
 from facert.data import BoolArray, FloatArray, IntArray
 
+_HAIR = 1e-9  # pixels, and weights
+_FAR = 1e9
+_Pair = tuple[FloatArray, FloatArray]
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What each pixel sees, rows from top to bottom.
+    """What the pixels see; n of them see the mesh, in the order of the image.
 
     Attributes
     ----------
     covered : array of bool, shape (H, W)
-    depth : array, shape (H, W)
+        Rows from top to bottom.
+    depth : array, shape (n,)
         Distance towards the viewer, in the mesh's unit.
-    normal : array, shape (H, W, 3)
+    normal : array, shape (3, n)
         Unit normals, turned towards the viewer.
-    colour : array, shape (H, W, 3)
-    inside : array of bool, shape (H, W)
+    colour : array, shape (3, n)
+    inside : array of bool, shape (n,)
         The pixel sees the back of a triangle.
     """
 
@@ -30,6 +35,24 @@ class Surface:
     normal: FloatArray
     colour: FloatArray
     inside: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Hits:
+    """Pixels that lie in triangles: the triangle, the pixel, and two barycentric weights."""
+
+    face: IntArray
+    pixel: IntArray
+    first: FloatArray
+    second: FloatArray
+
+    def __getitem__(self, chosen: BoolArray | IntArray) -> _Hits:
+        return _Hits(self.face[chosen], self.pixel[chosen], self.first[chosen], self.second[chosen])
+
+    def interpolate(self, corners: FloatArray) -> FloatArray:
+        """Values (n,) at the pixels, from those at the triangles' corners (3, F)."""
+        a, b, c = corners[:, self.face]
+        return np.asarray(c + self.first * (a - c) + self.second * (b - c))
 
 
 def rasterise(
@@ -46,67 +69,94 @@ def rasterise(
     size : int
         Pixels a side.
     """
-    face, row, column = _candidates(pixels[faces], size)
-    weights, inside = _barycentric(pixels[faces[face]], row, column)
-    hit = (weights >= 0).all(axis=1)
-    face, weights, inside = face[hit], weights[hit], inside[hit]
-    pixel = row[hit] * size + column[hit]
-    depth = (weights * pixels[faces[face], 2]).sum(axis=1)
-    nearest_last = np.argsort(depth, kind="stable")
-    nearest = np.full(size * size, -1)
-    nearest[pixel[nearest_last]] = nearest_last
-    covered = nearest >= 0
-    seen = nearest[covered]
-    corners, weights = faces[face[seen]], weights[seen][..., None]
-
-    def image(values: FloatArray) -> FloatArray:
-        flat = np.zeros((size * size, *values.shape[1:]))
-        flat[covered] = values
-        return flat.reshape(size, size, *values.shape[1:])
-
-    normal = (weights * normals[corners]).sum(axis=1)
-    normal *= np.where(inside[seen], -1, 1)[:, None]
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    corners = np.ascontiguousarray(pixels.T)[:, faces.T]  # (column, row or depth; corner; F)
+    area = _area(corners)
+    hits = _hits(corners, area, size)
+    hits, depth = _nearest(hits, hits.interpolate(corners[2]), size)
+    covered = np.zeros(size * size, dtype=bool)
+    covered[hits.pixel] = True
+    inside = area[hits.face] > 0  # rows grow downwards: anticlockwise triangles have area < 0
+    normal = np.stack([hits.interpolate(part[faces.T]) for part in normals.T])
+    normal *= np.where(inside, -1, 1) / np.maximum(np.sqrt((normal**2).sum(axis=0)), 1e-12)
     return Surface(
         covered.reshape(size, size),
-        image(depth[seen]),
-        image(normal),
-        image((weights * colours[corners]).sum(axis=1)),
-        image(inside[seen].astype(float)) > 0,
+        depth,
+        normal,
+        np.stack([hits.interpolate(part[faces.T]) for part in colours.T]),
+        inside,
     )
 
 
-def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Smooth unit normals (V, 3): the mean over the triangles at a vertex, by area."""
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = np.zeros_like(vertices)
-    np.add.at(total, faces.ravel(), np.repeat(normal, 3, axis=0))
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))
-
-
-def _candidates(corners: FloatArray, size: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Every pixel of every triangle's bounding box: index of the triangle, row, column."""
-    low = np.clip(np.ceil(corners[..., :2].min(axis=1)), 0, size).astype(np.int64)
-    high = np.clip(np.floor(corners[..., :2].max(axis=1)) + 1, 0, size).astype(np.int64)
-    width, height = np.maximum(high - low, 0).T
-    count = width * height
-    face = np.repeat(np.arange(len(corners)), count)
-    place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    row = low[face, 1] + place // width[face]
-    column = low[face, 0] + place % width[face]
-    return face, row, column
-
-
-def _barycentric(
-    corners: FloatArray, row: IntArray, column: IntArray
-) -> tuple[FloatArray, BoolArray]:
-    """Weights of the corners (n, 3) at each pixel, and whether the triangle shows its back."""
-    (ax, ay), (bx, by), (cx, cy) = np.moveaxis(corners[..., :2], (1, 2), (0, 1))
+def _area(corners: FloatArray) -> FloatArray:
+    """Twice the area of each triangle on the picture, with its sign; 0 for a mere line."""
+    (ax, bx, cx), (ay, by, cy), _ = corners
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    safe = np.where(area == 0, np.inf, area)
-    first = ((bx - column) * (cy - row) - (by - row) * (cx - column)) / safe
-    second = ((cx - column) * (ay - row) - (cy - row) * (ax - column)) / safe
-    weights = np.column_stack([first, second, 1 - first - second])
-    weights[area == 0] = -1
-    return weights, area > 0  # rows grow downwards, so anticlockwise triangles have area < 0
+    return np.where(np.abs(area) < _HAIR, 0, area)
+
+
+def _hits(corners: FloatArray, area: FloatArray, size: int) -> _Hits:
+    """The pixels of each triangle, line by line.
+
+    On a line of pixels the three barycentric weights are linear in the column, so that the
+    columns where all of them are positive are one span.
+    """
+    face, row = _lines(corners, size, area)
+    (ax, bx, cx), (ay, by, cy), _ = corners
+    inverse = 1 / np.where(area == 0, 1, area)
+    y = row - cy[face]  # from the third corner
+    slopes = ((by - cy) * inverse)[face], ((cy - ay) * inverse)[face]
+    starts = y * ((cx - bx) * inverse)[face], y * ((ax - cx) * inverse)[face]
+    low, high = _span(slopes, starts)
+    left = np.maximum(np.ceil(low + cx[face]), 0).astype(np.int64)
+    right = np.minimum(np.floor(high + cx[face]), size - 1).astype(np.int64)
+    count = np.maximum(right - left + 1, 0)
+    line = np.repeat(np.arange(len(face)), count)
+    column = left[line] + _counted(count)
+    face, row = face[line], row[line]
+    x = column - cx[face]
+    weights = (start[line] + x * slope[line] for start, slope in zip(starts, slopes, strict=True))
+    first, second = (np.clip(weight, 0, 1) for weight in weights)
+    np.minimum(second, 1 - first, out=second)  # by that hair, a sliver would reach far beyond
+    return _Hits(face, row * size + column, first, second)
+
+
+def _lines(corners: FloatArray, size: int, area: FloatArray) -> tuple[IntArray, IntArray]:
+    """Every line of pixels that a triangle reaches: index of the triangle, row."""
+    low = np.clip(np.ceil(corners[1].min(axis=0)), 0, size).astype(np.int64)
+    high = np.clip(np.floor(corners[1].max(axis=0)) + 1, 0, size).astype(np.int64)
+    height = np.where(area == 0, 0, np.maximum(high - low, 0))
+    face = np.repeat(np.arange(len(height)), height)
+    return face, low[face] + _counted(height)
+
+
+def _span(slopes: _Pair, starts: _Pair) -> _Pair:
+    """Where on each line the weights s + x m of two corners, and of the third, are not negative.
+
+    A hair wider, so that no pixel on the edge of two triangles falls between them.
+    """
+    low, high = np.full(len(slopes[0]), -_FAR), np.full(len(slopes[0]), _FAR)
+    third = -slopes[0] - slopes[1], 1 - starts[0] - starts[1]
+    for slope, start in (*zip(slopes, starts, strict=True), third):
+        level = np.abs(slope) < _HAIR
+        zero = -start / np.where(level, 1, slope)
+        np.maximum(low, zero, out=low, where=slope >= _HAIR)
+        np.minimum(high, zero, out=high, where=slope <= -_HAIR)
+        low[level & (start < -_HAIR)] = _FAR
+    return low - _HAIR, high + _HAIR
+
+
+def _counted(lengths: IntArray) -> IntArray:
+    """0, 1, ... up to each length, one after the other."""
+    ends = np.cumsum(lengths)
+    return np.asarray(np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - lengths, lengths))
+
+
+def _nearest(hits: _Hits, depth: FloatArray, size: int) -> tuple[_Hits, FloatArray]:
+    """One hit a pixel, the nearest to the viewer, in the order of the image."""
+    front = np.full(size * size, -np.inf)
+    np.maximum.at(front, hits.pixel, depth)
+    shown = np.full(size * size, -1)
+    candidates = np.flatnonzero(depth == front[hits.pixel])
+    shown[hits.pixel[candidates]] = candidates
+    shown = shown[shown >= 0]
+    return hits[shown], depth[shown]

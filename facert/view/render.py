@@ -1,4 +1,4 @@
-"""Pictures of a performance: the markers, and the character's face beside the truth."""
+"""A sheet of pictures: frames from left to right, the markers and each face in a row."""
 
 from __future__ import annotations
 
@@ -7,29 +7,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, Rig, Take
+from facert.data import Rig, Take
 from facert.errors import InputError
-from facert.names import NameIndex, nearest
-from facert.view.shade import frame_mesh, shade
+from facert.view.faces import Face, frame_faces, posed_face, require_same_length
+from facert.view.shade import Camera, shade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CELL = 2.2  # inches a picture
-RESOLUTION = 150  # pixels an inch
-TURN = -0.22  # radians; seen a little from the side, a face has more shape
+PIXELS = 320
 INK = "#3a3f47"
 MAX_FRAMES = 40
 
 
 def render_faces(take: Take, rig: Rig, frames: Sequence[int], truth: Take | None = None) -> Figure:
-    """Frames of a take side by side.
+    """Frames of a take side by side: its markers if it has any, the character, the truth.
 
     Parameters
     ----------
     take : Take
-        With poses; its markers, if it has any, make the first row.
+        With poses.
     rig : Rig
         The character; shapes and controls are matched by name.
     frames : sequence of int
@@ -45,124 +44,78 @@ def render_faces(take: Take, rig: Rig, frames: Sequence[int], truth: Take | None
     InputError
         When names, frames or lengths do not fit together.
     """
+    faces = [posed_face(take, rig, "character")]
+    if truth is not None:
+        faces.append(posed_face(truth, rig, "truth"))
+    return render_sheet(faces, frames, take)
+
+
+def render_sheet(
+    faces: Sequence[Face], frames: Sequence[int], take: Take | None = None, pixels: int = PIXELS
+) -> Figure:
+    """A row of pictures for each face.
+
+    Parameters
+    ----------
+    faces : sequence of Face
+        With the same number of frames.
+    frames : sequence of int
+    take : Take, optional
+        Its markers, if it has any, make the first row.
+    pixels : int
+        Width and height of a picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        When frames or lengths do not fit together.
+    """
     from matplotlib.figure import Figure
 
-    frames = _checked_frames(frames, take)
-    rows: dict[str, FloatArray] = {"character": control_settings(take, rig, frames)}
-    if truth is not None:
-        _require_same_length(take, truth)
-        rows["truth"] = control_settings(truth, rig, frames)
-    with_markers = take.source.kind == "markers"
-    height, width = len(rows) + with_markers, len(frames)
-    figure = Figure(figsize=(CELL * width + 0.4, CELL * height + 0.3), dpi=RESOLUTION)
+    require_same_length(faces)
+    frames = checked_frames(frames, len(faces[0].motion))
+    with_markers = take is not None and take.source.kind == "markers"
+    height, width = len(faces) + with_markers, len(frames)
+    figure = Figure(figsize=(CELL * width + 0.4, CELL * height + 0.3), dpi=pixels / CELL)
     grid = figure.subplots(height, width, squeeze=False, gridspec_kw=_margins(figure))
-    for axes, frame in zip(grid[0], frames, strict=True):
-        axes.set_title(f"{take.time[frame]:.2f} s", fontsize=9, color=INK)
-    if with_markers:
+    for axes, time in zip(grid[0], faces[0].motion.time[frames], strict=True):
+        axes.set_title(f"{time:.2f} s", fontsize=9, color=INK)
+    if take is not None and with_markers:
         _draw_markers(grid[0], take, frames)
-    for line, (name, settings) in zip(grid[int(with_markers) :], rows.items(), strict=True):
-        _draw_faces(line, rig, settings)
-        _label(line[0], name)
+    cameras = frame_faces(faces, frames)
+    for line, face, camera in zip(grid[int(with_markers) :], faces, cameras, strict=True):
+        _draw_face(line, face, camera, frames, pixels)
+        _label(line[0], face.label)
     for axes in grid.flat:
         axes.set_axis_off()
     return figure
 
 
-def choose_frames(poses: FloatArray, count: int) -> list[int]:
-    """Frames whose poses (T, P) are far from each other, in order of time; NaN rows are left out.
-
-    The first is the pose nearest to rest, each next one the farthest from all before.
-    """
-    known = np.flatnonzero(~np.isnan(poses).any(axis=1))
-    if not len(known):
-        raise InputError(
-            "/target/params", "a pose in at least one frame", "none", "Retarget the take first."
-        )
-    poses = poses[known] / np.maximum(np.ptp(poses[known], axis=0), 1e-9)
-    distance = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
-    chosen = [int(distance.argmin())]
-    distance = np.full(len(poses), np.inf)
-    for _ in range(min(count, len(known)) - 1):
-        distance = np.minimum(distance, np.linalg.norm(poses - poses[chosen[-1]], axis=1))
-        chosen.append(int(distance.argmax()))
-    return sorted(int(frame) for frame in known[np.unique(chosen)])
-
-
-def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
-    """The take's poses in some frames as the rig's parameters (n, P); other shapes stay at 0.
-
-    Names are matched in any spelling; a control without a side drives both halves of its shape.
+def checked_frames(frames: Sequence[int], length: int) -> list[int]:
+    """The frames of a sheet, if they exist and are not too many.
 
     Raises
     ------
     InputError
-        When the take has no poses, or a control that the rig has no shape for.
+        When they do not.
     """
-    poses, controls = require_poses(take), take.controls
-    assert controls is not None  # poses come with controls
-    index = NameIndex(rig.names)
-    shapes = [_shapes_of(name, index) for name in controls.names]
-    unknown = [name for name, found in zip(controls.names, shapes, strict=True) if not found]
-    if unknown:
-        near = nearest(unknown[0], rig.names)
-        hint = f" (did you mean {near!r}?)" if near else ""
-        raise InputError(
-            "/target/names",
-            "controls that the rig has a shape for",
-            f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all",
-            "Give the rig of this take's character.",
-        )
-    settings = np.zeros((len(frames), len(rig.names)))
-    for column, found in enumerate(shapes):
-        settings[:, found] = poses[np.asarray(frames), column, None]
-    return settings
-
-
-def _shapes_of(control: str, index: NameIndex) -> list[int]:
-    """The shape of a control in any spelling, or its left and right halves."""
-    whole = index.find(control)
-    if whole is not None:
-        return [whole]
-    halves = (index.find(f"{control}_{side}") for side in "LR")
-    return [half for half in halves if half is not None]
-
-
-def require_poses(take: Take) -> FloatArray:
-    """The take's poses (T, P).
-
-    Raises
-    ------
-    InputError
-        When it has none.
-    """
-    if take.params is None or not len(take.labels):
-        raise InputError(
-            "/target/params", "poses of the character", "none", "Give a take that was retargeted."
-        )
-    return take.params
-
-
-def _checked_frames(frames: Sequence[int], take: Take) -> list[int]:
     if len(frames) > MAX_FRAMES:
         raise InputError(
             "--frames", f"at most {MAX_FRAMES} frames", f"{len(frames)}", "Draw several pictures."
         )
-    outside = [frame for frame in frames if not 0 <= frame < len(take)]
+    outside = [frame for frame in frames if not 0 <= frame < length]
     if outside or not frames:
         raise InputError(
             "--frames",
-            f"frames from 0 to {len(take) - 1}",
+            f"frames from 0 to {length - 1}",
             str(outside[0]) if outside else "none",
             "Choose others.",
         )
     return list(frames)
-
-
-def _require_same_length(take: Take, truth: Take) -> None:
-    if len(take) != len(truth):
-        raise InputError(
-            "--truth", f"{len(take)} frames", f"{len(truth)}", "Give the truth of the same take."
-        )
 
 
 def _draw_markers(line: Sequence[Axes], take: Take, frames: Sequence[int]) -> None:
@@ -179,15 +132,16 @@ def _draw_markers(line: Sequence[Axes], take: Take, frames: Sequence[int]) -> No
     _label(line[0], "markers")
 
 
-def _draw_faces(line: Sequence[Axes], rig: Rig, settings: FloatArray) -> None:
-    camera = frame_mesh(rig.neutral, TURN)
-    size = round(CELL * RESOLUTION)
-    for axes, setting in zip(line, settings, strict=True):
-        if np.isnan(setting).any():
+def _draw_face(
+    line: Sequence[Axes], face: Face, camera: Camera, frames: Sequence[int], pixels: int
+) -> None:
+    neutral = face.motion.neutral
+    for axes, frame in zip(line, frames, strict=True):
+        vertices = face.motion.fetch(np.array([frame]))[0]
+        if np.isnan(vertices).any():
             axes.text(0.5, 0.5, "no pose", ha="center", color=INK, transform=axes.transAxes)
             continue
-        vertices = rig.deform(setting[None])[0]
-        axes.imshow(shade(vertices, rig.faces, camera, size, rig.colours))
+        axes.imshow(shade(vertices, neutral.faces, camera, pixels, neutral.colours))
 
 
 def _label(axes: Axes, text: str) -> None:

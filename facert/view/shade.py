@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_fill_holes, uniform_filter
 
-from facert.data import FloatArray, IntArray
-from facert.view.raster import Surface, rasterise, vertex_normals
+from facert.data import BoolArray, FloatArray, IntArray
+from facert.geometry import vertex_normals
+from facert.view.raster import Surface, rasterise
 
 CLAY = (0.80, 0.72, 0.66)
 DARK = np.array([0.13, 0.05, 0.05])  # the inside of a mesh, as seen through an open mouth
 VIEW = np.array([0.0, 0.0, 1.0])
 KEY_LIGHT = np.array([-0.42, 0.52, 0.74])
+WARM, COOL = np.array([1.0, 0.96, 0.90]), np.array([0.75, 0.85, 1.0])
 RIM_LIGHT = np.array([0.85, 0.25, -0.35])
 _SMOOTHING = 2  # pixels drawn a side for each pixel shown
 
@@ -65,47 +67,60 @@ def shade(
     pixels = camera.project(vertices, fine)
     turned = pixels * [1, -1, fine / (2 * camera.reach)]
     surface = rasterise(pixels, vertex_normals(turned, faces), colours, faces, fine)
-    filled = binary_fill_holes(surface.covered)
-    colour = _light(surface, fine, camera.reach)
-    colour[filled & ~surface.covered] = DARK  # holes in a mask show the dark behind it
-    picture = np.dstack([colour, filled])
-    picture[..., :3] *= picture[..., 3:]
-    picture = picture.reshape(size, _SMOOTHING, size, _SMOOTHING, 4).mean(axis=(1, 3))
-    picture[..., :3] /= np.maximum(picture[..., 3:], 1e-9)
-    return np.asarray(np.clip(picture, 0, 1))
+    cell = _cells(surface.covered, size)
+    holes = _cells(binary_fill_holes(surface.covered) & ~surface.covered, size)
+    cover = _mean(cell, 1.0, size)
+    light = _light(surface, 1 - _occlusion(surface.depth, cell, size, camera.reach)[cell])
+    dark = _mean(holes, 1.0, size)  # holes in a mask show the dark behind it
+    picture = np.stack([_mean(cell, part, size) for part in light] + [cover + dark], axis=1)
+    picture[:, :3] += dark[:, None] * DARK
+    picture[:, :3] /= np.maximum(picture[:, 3:], 1e-9)
+    return np.asarray(np.clip(picture, 0, 1)).reshape(size, size, 4)
 
 
-def _light(surface: Surface, size: int, reach: float) -> FloatArray:
-    """Colours (H, W, 3) under a warm key light, sky, a cool rim light, and soft shadow."""
+def _cells(chosen: BoolArray, size: int) -> IntArray:
+    """In which pixel of the picture each chosen pixel of the finer drawing lies, (n,)."""
+    row, column = np.divmod(np.flatnonzero(chosen), chosen.shape[1])
+    return np.asarray(row // _SMOOTHING * size + column // _SMOOTHING)
+
+
+def _mean(cell: IntArray, values: FloatArray | float, size: int) -> FloatArray:
+    """Mean of values (n,) over the fine pixels of each pixel; what is not covered counts as 0."""
+    weights = np.broadcast_to(values, cell.shape) / _SMOOTHING**2
+    return np.bincount(cell, weights, size * size).astype(np.float64)
+
+
+def _light(surface: Surface, open_sky: FloatArray) -> FloatArray:
+    """Colours (3, n) of the covered pixels under a warm key light, sky, rim and soft shadow."""
     normal = surface.normal
-    key = np.clip(0.5 * (normal @ _unit(KEY_LIGHT)) + 0.5, 0, 1) ** 2
-    sky = 0.5 + 0.5 * normal[..., 1]
-    rim = np.clip(normal @ _unit(RIM_LIGHT), 0, 1) ** 2
-    facing = np.clip(normal[..., 2], 0, 1)
-    rim += 0.35 * (1 - facing) ** 4
-    gloss = np.clip(normal @ _unit(_unit(KEY_LIGHT) + VIEW), 0, 1) ** 60
-    open_sky = 1 - _occlusion(surface, size, reach)
-    warm, cool = np.array([1.0, 0.96, 0.90]), np.array([0.75, 0.85, 1.0])
-    light = (0.12 + 0.80 * key[..., None] * warm + 0.36 * sky[..., None] * cool) * open_sky[
-        ..., None
-    ]
-    light += 0.25 * rim[..., None] * cool * open_sky[..., None]
-    colour = surface.colour * light + 0.10 * (gloss * open_sky)[..., None]
-    inside = DARK * (0.4 + 0.6 * light)
-    return np.asarray(np.where(surface.inside[..., None], inside, colour))
+    key = 0.80 * np.clip(0.5 * (_unit(KEY_LIGHT) @ normal) + 0.5, 0, 1) ** 2
+    cool = 0.36 * (0.5 + 0.5 * normal[1])
+    cool += 0.25 * np.clip(_unit(RIM_LIGHT) @ normal, 0, 1) ** 2
+    cool += 0.25 * 0.35 * (1 - np.clip(normal[2], 0, 1)) ** 4
+    gloss = np.clip(_unit(_unit(KEY_LIGHT) + VIEW) @ normal, 0, 1) ** 60
+    light = (0.12 + WARM[:, None] * key + COOL[:, None] * cool) * open_sky
+    colour = surface.colour * light + 0.10 * gloss * open_sky
+    inside = surface.inside
+    colour[:, inside] = DARK[:, None] * (0.4 + 0.6 * light[:, inside])
+    return np.asarray(colour)
 
 
-def _occlusion(surface: Surface, size: int, reach: float) -> FloatArray:
-    """How much of the sky the surroundings hide (H, W): hollows lie behind their mean depth."""
-    hidden = np.zeros_like(surface.depth)
-    cover = surface.covered.astype(float)
+def _occlusion(fine_depth: FloatArray, cell: IntArray, size: int, reach: float) -> FloatArray:
+    """How much of the sky the surroundings hide, (size * size,).
+
+    A hollow lies behind the mean depth around it.
+    """
+    cover = _mean(cell, 1.0, size).reshape(size, size)
+    depth = _mean(cell, fine_depth, size).reshape(size, size)
+    own = depth / np.maximum(cover, 1e-6)
+    hidden = np.zeros_like(depth)
     for width in (0.012, 0.04):
         sigma = width * size
         near = _blur(cover, sigma)
-        mean = _blur(surface.depth * cover, sigma) / np.maximum(near, 1e-6)
-        hollow = np.clip((mean - surface.depth) / (reach * width * 4.5), 0, 0.5)
+        mean = _blur(depth, sigma) / np.maximum(near, 1e-6)
+        hollow = np.clip((mean - own) / (reach * width * 4.5), 0, 0.5)
         hidden += hollow * np.clip(2 * near - 1, 0, 1)  # an outline is no hollow
-    return np.asarray(np.clip(hidden, 0, 0.75) * cover)
+    return np.asarray(np.clip(hidden, 0, 0.75).ravel())
 
 
 def _blur(image: FloatArray, sigma: float) -> FloatArray:

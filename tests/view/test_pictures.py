@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from facert.data import Controls, Rig, Source, Take
 from facert.errors import InputError
+from facert.geometry import vertex_normals
+from facert.view.faces import choose_frames, control_settings
 from facert.view.plots import plot_controls
-from facert.view.raster import rasterise, vertex_normals
-from facert.view.render import choose_frames, control_settings, render_faces
+from facert.view.raster import rasterise
+from facert.view.render import render_faces
 from facert.view.shade import Camera, frame_mesh, shade
 
 SQUARE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -71,7 +73,8 @@ def test_any_triangle_stays_on_the_picture(corners: list[tuple[float, float, flo
     pixels = np.array(corners)
     surface = rasterise(pixels, np.ones((3, 3)), np.ones((3, 3)), np.array([[0, 1, 2]]), 32)
     assert surface.covered.shape == (32, 32)
-    depth = surface.depth[surface.covered]
+    depth = surface.depth
+    assert len(depth) == surface.covered.sum()
     assert ((depth >= pixels[:, 2].min() - 1e-6) & (depth <= pixels[:, 2].max() + 1e-6)).all()
 
 

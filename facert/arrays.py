@@ -1,0 +1,98 @@
+"""Types of arrays, and the checks that the nouns make of what they are given."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facert.errors import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
+# HDF5 cannot hold NUL, UTF-8 no half of a pair; control characters and line ends upset a terminal.
+_FORBIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+
+
+def set_fields(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass while it is being made."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
+def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
+    """The same array, made read-only."""
+    array.setflags(write=False)
+    return array
+
+
+def float_array(value: ArrayLike, path: str) -> FloatArray:
+    """A float64 array; a copy, so that freezing it never touches the caller's."""
+    array = np.array(value)
+    if array.dtype.kind not in "fiu" or not array.size:
+        raise InputError(
+            path, "numbers", f"{array.dtype} {array.shape}", "Write a numeric array with data."
+        )
+    return array.astype(np.float64)
+
+
+def require_time(time: FloatArray, frames: int, fps: float) -> None:
+    """Check the seconds of the frames and the nominal frame rate."""
+    if time.shape != (frames,):
+        raise InputError(
+            "/time", f"{frames} seconds", f"shape {time.shape}", "Give one time a frame."
+        )
+    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise InputError(
+            "/time",
+            "finite, strictly rising seconds",
+            "a step back, a repeat or NaN",
+            "Sort the frames by time and drop repeats.",
+        )
+    if not (np.isfinite(fps) and fps > 0):
+        raise InputError("fps", "a positive number", f"{fps}", "Set the frame rate.")
+
+
+def checked_colours(value: ArrayLike | None, vertices: int) -> FloatArray | None:
+    """Colours (V, 3) of a mesh's vertices, if there are any."""
+    if value is None:
+        return None
+    colours = float_array(value, "/colours")
+    if colours.shape != (vertices, 3) or not ((colours >= 0) & (colours <= 1)).all():
+        raise InputError(
+            "/colours",
+            f"({vertices}, 3) between 0 and 1",
+            f"shape {colours.shape}, or values outside",
+            "Give red, green and blue of every vertex, or leave the colours out.",
+        )
+    return frozen(colours)
+
+
+def checked_names(names: Sequence[str], count: int, path: str) -> tuple[str, ...]:
+    """Check that there is one name a column, each plain text, none empty and none twice."""
+    names = tuple(str(name) for name in names)
+    if len(names) != count or not names:
+        raise InputError(path, f"{count} names", f"{len(names)}", "Give one name a column.")
+    doubled = [name for name, count in Counter(names).items() if count > 1]
+    if doubled or "" in names:
+        found = f"{doubled[0]!r} twice" if doubled else "an empty name"
+        raise InputError(path, "names that are all different", found, "Rename one of them.")
+    for name in names:
+        require_plain(name, path)
+    return names
+
+
+def require_plain(text: str, path: str) -> None:
+    """Refuse text that no file can hold, or that could upset a terminal."""
+    if _FORBIDDEN.search(text):
+        raise InputError(
+            path, "text without control characters", repr(text[:60]), "Write plain text."
+        )

@@ -1,0 +1,175 @@
+"""GLB (binary glTF 2.0): a mesh with morph targets and an animation of their weights.
+
+A GLB file is a header, a chunk of JSON and a chunk of bytes. All numbers lie in the latter as
+little-endian arrays; the JSON tells of each (an accessor) where it is, its type and its bounds.
+Blender, Maya, Unreal and web viewers read the targets' names from the mesh's ``extras``.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import facert
+from facert.data import FloatArray, IntArray, Mesh
+from facert.errors import InputError
+from facert.geometry import vertex_normals
+from facert.io.atomic import replacing
+from facert.morphs import Morphs
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+"""glTF counts in metres; another or no unit is taken as it is."""
+
+_GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
+_TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}
+_VERTICES, _INDICES = 34962, 34963
+_LARGEST = 2**32 - 1
+
+
+class _Buffer:
+    """The bytes of a file in the making, and what the JSON says of them."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, array: NDArray[Any], use: int | None = None) -> int:
+        """Append an array (n,) or (n, 3); return the number of its accessor."""
+        content = array.tobytes()
+        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(content)}
+        self.views.append(view | ({"target": use} if use else {}))
+        self.accessors.append(
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": _TYPES[array.dtype],
+                "count": len(array),
+                "type": "SCALAR" if array.ndim == 1 else "VEC3",
+                "min": np.atleast_1d(array.min(axis=0)).tolist(),
+                "max": np.atleast_1d(array.max(axis=0)).tolist(),
+            }
+        )
+        self.parts.append(content)
+        self.size += len(content)  # every item has four bytes, so all stays aligned
+        return len(self.accessors) - 1
+
+    def vertices(self, values: FloatArray) -> int:
+        """Append something of every vertex, (V, 3)."""
+        return self.add(values.astype("<f4"), _VERTICES)
+
+    def keys(self, values: FloatArray) -> int:
+        """Append numbers of an animation, flattened."""
+        return self.add(values.astype("<f4").ravel())
+
+    def corners(self, faces: IntArray) -> int:
+        """Append triangles (F, 3)."""
+        return self.add(faces.astype("<u4").ravel(), _INDICES)
+
+
+def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
+    """Write a mesh with morph targets and the animation of their weights, which begins at 0 s.
+
+    Raises
+    ------
+    InputError
+        When the mesh has no triangles, or the file would exceed 4 GiB, as much as GLB can hold.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    if not len(morphs.neutral.faces):
+        raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))
+    buffer = _Buffer()
+    document = _document(morphs, Path(path).stem, buffer)
+    text = json.dumps(document, separators=(",", ":"), ensure_ascii=True).encode()
+    text += b" " * (-len(text) % 4)
+    total = 12 + 8 + len(text) + 8 + buffer.size
+    if total > _LARGEST:
+        fix = "Choose fewer frames, or a larger tolerance."
+        raise InputError("output", "at most 4 GiB", f"{total} bytes", fix, str(path))
+    with replacing(path, overwrite) as temporary, temporary.open("wb") as file:
+        file.write(struct.pack("<III", _GLTF, 2, total))
+        file.write(struct.pack("<II", len(text), _JSON) + text)
+        file.write(struct.pack("<II", buffer.size, _BIN))
+        file.writelines(buffer.parts)
+
+
+def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+    node: dict[str, Any] = {"name": name, "mesh": 0}
+    metres = METRES.get(morphs.neutral.units, 1.0)
+    if metres != 1.0:
+        node["scale"] = [metres] * 3
+    mesh = _mesh(morphs, name, buffer)
+    animation = _animation(morphs, name, buffer)
+    return {
+        "asset": {"version": "2.0", "generator": f"facert {facert.__version__}"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [node],
+        "meshes": [mesh],
+        "materials": [_material(morphs.neutral)],
+        "animations": [animation],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": buffer.size}],
+    }
+
+
+def _mesh(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+    neutral = morphs.neutral
+    normals = _unit_normals(neutral.vertices, neutral.faces)
+    attributes = {
+        "POSITION": buffer.vertices(neutral.vertices),
+        "NORMAL": buffer.vertices(normals),
+    }
+    if neutral.colours is not None:
+        attributes["COLOR_0"] = buffer.vertices(neutral.colours**2.2)  # glTF's are linear light
+    targets = [
+        {
+            "POSITION": buffer.vertices(target),
+            "NORMAL": buffer.vertices(
+                _unit_normals(neutral.vertices + target, neutral.faces) - normals
+            ),
+        }
+        for target in morphs.targets
+    ]
+    primitive = {
+        "attributes": attributes,
+        "indices": buffer.corners(neutral.faces),
+        "material": 0,
+        "targets": targets,
+    }
+    return {
+        "name": name,
+        "primitives": [primitive],
+        "weights": [0.0] * len(targets),
+        "extras": {"targetNames": list(morphs.names)},
+    }
+
+
+def _animation(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+    sampler = {
+        "input": buffer.keys(morphs.time - morphs.time[0]),
+        "output": buffer.keys(morphs.weights),
+        "interpolation": "LINEAR",
+    }
+    channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+    return {"name": name, "samplers": [sampler], "channels": [channel]}
+
+
+def _material(neutral: Mesh) -> dict[str, Any]:
+    clay = [0.60, 0.48, 0.40, 1.0] if neutral.colours is None else [1.0] * 4
+    surface = {"baseColorFactor": clay, "metallicFactor": 0.0, "roughnessFactor": 0.7}
+    return {"name": "face", "doubleSided": True, "pbrMetallicRoughness": surface}
+
+
+def _unit_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Normals (V, 3) of length 1, as glTF wants them, of vertices without a triangle too."""
+    normals = vertex_normals(vertices, faces)
+    normals[np.linalg.norm(normals, axis=1) < 0.5] = (0.0, 0.0, 1.0)
+    return normals

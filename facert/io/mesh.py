@@ -1,0 +1,37 @@
+"""A mesh at rest from a file of any kind: OBJ, PLY, or the rest pose of a rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from facert.data import Mesh
+from facert.errors import reading
+from facert.io.formats import read_rig_file
+from facert.io.obj import read_obj
+from facert.io.ply import read_ply
+
+
+def read_mesh(path: Path, shapes: str | None = None) -> Mesh:
+    """Read a mesh: ``.obj``, ``.ply``, or the rest pose of a rig (``.h5``, ``.npz``, a folder).
+
+    The vertices keep the file's order; quads and polygons become triangle fans.
+
+    Parameters
+    ----------
+    path : Path
+    shapes : str, optional
+        Which set of shapes of an .npz rig that holds several.
+
+    Raises
+    ------
+    InputError
+        For an unknown ending, or a file that is not what its ending says.
+    """
+    path = Path(path)
+    ending = path.suffix.lower() if not path.is_dir() else ""
+    if ending == ".ply":
+        return read_ply(path)
+    if ending == ".obj":
+        with reading(path):
+            return Mesh(*read_obj(path))
+    return read_rig_file(path, shapes).mesh

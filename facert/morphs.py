@@ -1,0 +1,172 @@
+"""A mesh in motion as morph targets: vertices(t) = neutral + sum_k weights_k(t) * targets_k.
+
+A rig has its targets: its shapes. The frames of a dense sequence, displacements D (T, 3V) from the
+neutral, get a compact basis by a randomised range finder (Halko, Martinsson and Tropp, SIAM Review
+53, 2011): Q is an orthonormal basis of random mixtures of the frames, large enough that no vertex
+of D - (D Q) Q' is off by more than the tolerance; the singular vectors of the small matrix D Q
+then order its directions, and the weakest are dropped as far as the tolerance allows. Frames are
+read in batches, so that memory does not grow with their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import FloatArray, Mesh, MeshSequence, Rig
+from facert.errors import InputError
+
+TOLERANCE = 1e-3
+_FIRST_SIZE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Morphs:
+    """A mesh moved by weighted targets.
+
+    Attributes
+    ----------
+    neutral : Mesh
+    targets : array, shape (K, V, 3)
+        Displacement of every vertex when a weight is 1.
+    names : tuple of str, length K
+    weights : array, shape (T, K)
+    time : array, shape (T,)
+        Seconds.
+    error : float
+        The targets miss no vertex of the original by more, in the neutral's units.
+    """
+
+    neutral: Mesh
+    targets: FloatArray
+    names: tuple[str, ...]
+    weights: FloatArray
+    time: FloatArray
+    error: float = 0.0
+
+
+def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray) -> Morphs:
+    """A rig's own shapes, without those that stay at 0.
+
+    Parameters
+    ----------
+    rig : Rig
+    params : array, shape (T, P)
+        Rows of NaN, frames without a pose, are left out.
+    time : array, shape (T,)
+
+    Raises
+    ------
+    InputError
+        When no frame has a pose.
+    """
+    posed = ~np.isnan(params).any(axis=1)
+    if not posed.any():
+        raise InputError("/target/params", "a pose", "none", "Retarget the take first.")
+    moving = np.flatnonzero(np.any(params[posed] != 0, axis=0))
+    moving = moving if len(moving) else np.arange(1)
+    names = tuple(rig.names[index] for index in moving)
+    return Morphs(rig.mesh, rig.shapes[moving], names, params[np.ix_(posed, moving)], time[posed])
+
+
+def compact_morphs(sequence: MeshSequence, tolerance: float = TOLERANCE, seed: int = 0) -> Morphs:
+    """A few targets that move a mesh as a dense sequence does.
+
+    Parameters
+    ----------
+    sequence : MeshSequence
+        Every frame finite.
+    tolerance : float
+        Most that a vertex of any frame may be off, as a share of the largest displacement of a
+        vertex in the sequence.
+    seed : int
+        For the random mixtures.
+    """
+    size = min(_FIRST_SIZE, len(sequence))
+    while True:
+        mixtures, motion = _mix(sequence, size, seed)
+        basis, _ = np.linalg.qr(mixtures.T)  # (3V, size)
+        weights, missed = _project(sequence, basis)
+        if missed <= 0.5 * tolerance * motion or size == len(sequence):
+            break
+        size = min(2 * size, len(sequence))
+    left, strength, right = np.linalg.svd(weights, full_matrices=False)
+    weights, basis = left * strength, basis @ right.T
+    count, dropped = _fewest(weights, basis, tolerance * motion - missed)
+    return _scaled(sequence, weights[:, :count], basis[:, :count], missed + dropped)
+
+
+def _displacements(sequence: MeshSequence) -> Iterator[tuple[slice, FloatArray]]:
+    """The frames' rows and displacements (n, 3V), a batch at a time."""
+    start = 0
+    for vertices in sequence.batches():
+        moved = (vertices - sequence.neutral.vertices).reshape(len(vertices), -1)
+        yield slice(start, start + len(moved)), moved
+        start += len(moved)
+
+
+def _mix(sequence: MeshSequence, size: int, seed: int) -> tuple[FloatArray, float]:
+    """Random mixtures (size, 3V) of the frames, and the largest displacement of a vertex."""
+    frames = len(sequence)
+    mixing = np.eye(frames)
+    if size < frames:
+        mixing = np.random.default_rng(seed).normal(size=(frames, size))
+    mixtures, motion = np.zeros((size, sequence.neutral.vertices.size)), 0.0
+    for rows, moved in _displacements(sequence):
+        mixtures += mixing[rows].T @ moved
+        motion = max(motion, _largest(moved))
+    return mixtures, motion
+
+
+def _project(sequence: MeshSequence, basis: FloatArray) -> tuple[FloatArray, float]:
+    """Weights (T, size) of an orthonormal basis, and how far off it leaves a vertex at most."""
+    weights, missed = np.empty((len(sequence), basis.shape[1])), 0.0
+    for rows, moved in _displacements(sequence):
+        weights[rows] = moved @ basis
+        missed = max(missed, _largest(moved - weights[rows] @ basis.T))
+    return weights, missed
+
+
+def _fewest(weights: FloatArray, basis: FloatArray, allowed: float) -> tuple[int, float]:
+    """How many of the first directions do, and how far a vertex is off without the others.
+
+    The feeblest go by the sum of what each can do at most, which is quick; then as many more as
+    the true distances allow, in steps of a sixteenth.
+    """
+    reach = np.abs(weights).max(axis=0) * _lengths(basis.T).max(axis=1)
+    without = np.append(np.cumsum(reach[::-1])[::-1], 0.0)  # at most, with the first k kept
+    size = max(1, int(np.flatnonzero(without <= 0.01 * max(allowed, 0.0))[0]))
+    ends = np.arange(size, 0, -max(1, size // 16))  # directions kept, from all to few
+    dropped = np.zeros(len(ends))
+    for start in range(0, len(weights), 64):
+        rows = slice(start, start + 64)
+        tail = np.zeros((len(weights[rows]), len(basis)))
+        for place, end in enumerate(ends[1:], start=1):
+            block = slice(end, ends[place - 1])
+            tail += weights[rows, block] @ basis[:, block].T
+            dropped[place] = max(dropped[place], _largest(tail))
+    dropped += without[size]
+    kept = int(np.flatnonzero(dropped <= max(allowed, dropped[0]))[-1])
+    return int(ends[kept]), float(dropped[kept])
+
+
+def _scaled(sequence: MeshSequence, weights: FloatArray, basis: FloatArray, error: float) -> Morphs:
+    """Morphs whose weights run to 1 at most, with the sign of their strongest value."""
+    strongest = np.abs(weights).argmax(axis=0)
+    scale = weights[strongest, np.arange(weights.shape[1])]
+    scale = np.where(scale == 0, 1.0, scale)
+    targets = (basis * scale).T.reshape(-1, *sequence.neutral.vertices.shape)
+    names = tuple(f"motion{index}" for index in range(1, len(targets) + 1))
+    return Morphs(sequence.neutral, targets, names, weights / scale, sequence.time, error)
+
+
+def _largest(moved: FloatArray) -> float:
+    """The longest displacement of a vertex in displacements (n, 3V)."""
+    return float(_lengths(moved).max())
+
+
+def _lengths(moved: FloatArray) -> FloatArray:
+    """The lengths (n, V) of displacements (n, 3V)."""
+    return np.asarray(np.sqrt((moved**2).reshape(len(moved), -1, 3).sum(axis=2)))

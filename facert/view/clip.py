@@ -1,0 +1,91 @@
+"""Faces in motion: the pictures of a clip, faces side by side, each with its name below."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from facert.data import FloatArray, IntArray
+from facert.view.faces import Face, frame_faces, require_same_length
+from facert.view.shade import Camera, shade
+
+PIXELS = 300
+CAPTION = 28
+INK = (58, 63, 71)
+_AT_ONCE = 8  # frames that are drawn in parallel
+
+Pixels = NDArray[np.uint8]
+
+
+def sampled_frames(time: FloatArray, part: range, fps: float) -> IntArray:
+    """The frames (n,) nearest to the evenly spaced moments of a clip.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        Seconds of the frames, with gaps perhaps.
+    part : range
+        The frames from which the clip is cut.
+    fps : float
+        Frames a second of the clip.
+    """
+    seconds = time[part.start : part.stop]
+    moments = np.arange(seconds[0], seconds[-1] + 0.5 / fps, 1 / fps)
+    return part.start + np.searchsorted((seconds[1:] + seconds[:-1]) / 2, moments)
+
+
+def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> Iterator[Pixels]:
+    """Pictures (H, W, 3) from 0 to 255 of some frames, one after the other.
+
+    Parameters
+    ----------
+    faces : sequence of Face
+        With the same number of frames.
+    frames : array of int, shape (n,)
+    pixels : int
+        Width and height of each face; even, as video wants it.
+
+    Raises
+    ------
+    InputError
+        When lengths do not fit together.
+    """
+    require_same_length(faces)
+    cameras = frame_faces(faces, [int(frame) for frame in frames])
+    with ThreadPoolExecutor(min(_AT_ONCE, os.cpu_count() or 1)) as pool:
+        for start in range(0, len(frames), _AT_ONCE):
+            numbers = frames[start : start + _AT_ONCE]
+            strips = [
+                pool.map(partial(_draw, face, camera, pixels), face.motion.fetch(numbers))
+                for face, camera in zip(faces, cameras, strict=True)
+            ]
+            for frame, pictures in zip(numbers, zip(*strips, strict=True), strict=True):
+                yield _side_by_side(pictures, faces, float(faces[0].motion.time[frame]))
+
+
+def _draw(face: Face, camera: Camera, pixels: int, vertices: FloatArray) -> Pixels:
+    """One face on white."""
+    if np.isnan(vertices).any():
+        return np.full((pixels, pixels, 3), 255, dtype=np.uint8)
+    neutral = face.motion.neutral
+    picture = shade(vertices, neutral.faces, camera, pixels, neutral.colours)
+    on_white = 1 + picture[..., 3:] * (picture[..., :3] - 1)
+    return np.round(255 * on_white).astype(np.uint8)
+
+
+def _side_by_side(pictures: Sequence[Pixels], faces: Sequence[Face], seconds: float) -> Pixels:
+    pixels = len(pictures[0])
+    sheet = Image.new("RGB", (pixels * len(faces), pixels + CAPTION), "white")
+    text, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
+    for place, (picture, face) in enumerate(zip(pictures, faces, strict=True)):
+        sheet.paste(Image.fromarray(picture), (place * pixels, 0))
+        middle = (place * pixels + pixels // 2, pixels + CAPTION // 2)
+        text.text(middle, face.label, INK, font, anchor="mm")
+    text.text((8, 8), f"{seconds:.2f} s", INK, font)
+    return np.asarray(sheet)

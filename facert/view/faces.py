@@ -1,0 +1,148 @@
+"""Faces to look at: what moves on a picture, with its name, whatever file it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, MeshSequence, Rig, Take
+from facert.errors import InputError
+from facert.names import shape_drivers
+from facert.view.shade import Camera, frame_mesh
+
+TURN = -0.22  # radians; seen a little from the side, a face has more shape
+_LOOKED_AT = 16  # frames that tell how much room a face needs
+_MOST_ROOM = 1.3
+_SAMPLED = 100  # vertices that tell frames of a mesh from each other
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A mesh in motion and what to write beside it."""
+
+    label: str
+    motion: MeshSequence
+
+
+def frame_faces(faces: Sequence[Face], frames: Sequence[int]) -> list[Camera]:
+    """A view of each face, the same for all frames, that shows where it goes in most of them.
+
+    Each is as large as its neutral allows; all shrink alike when one needs more room, so that
+    faces beside each other stay comparable.
+    """
+    cameras = [frame_mesh(face.motion.neutral.vertices, TURN) for face in faces]
+    some = np.asarray(frames)[:: max(1, len(frames) // _LOOKED_AT)]
+    needed = 1.0
+    for face, camera in zip(faces, cameras, strict=True):
+        for vertices in face.motion.fetch(some):
+            off = np.abs(camera.project(vertices, 2)[:, :2] - 0.5).max()  # 1 at the border
+            needed = max(needed, 0.0 if np.isnan(off) else off)
+    room = min(1.02 * needed, _MOST_ROOM) if needed > 1 else 1.0
+    return [replace(camera, reach=room * camera.reach) for camera in cameras]
+
+
+def posed_face(take: Take, rig: Rig, label: str) -> Face:
+    """The rig in the poses of a take; NaN where a frame has none.
+
+    Raises
+    ------
+    InputError
+        When the take has no poses, or a control that the rig has no shape for.
+    """
+    settings = control_settings(take, rig, range(len(take)))
+
+    def fetch(frames: IntArray) -> FloatArray:
+        return rig.deform(settings[frames])
+
+    return Face(label, MeshSequence(rig.mesh, take.time, fetch, take.fps))
+
+
+def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
+    """The take's poses in some frames as the rig's parameters (n, K); other shapes stay at 0.
+
+    Raises
+    ------
+    InputError
+        When the take has no poses, or a control that the rig has no shape for, see
+        `facert.names.shape_drivers`.
+    """
+    poses, controls = require_poses(take), take.controls
+    assert controls is not None  # poses come with controls
+    return np.asarray(poses[np.asarray(frames)] @ shape_drivers(controls.names, rig.names))
+
+
+def require_poses(take: Take) -> FloatArray:
+    """The take's poses (T, P).
+
+    Raises
+    ------
+    InputError
+        When it has none.
+    """
+    if take.params is None or not len(take.labels):
+        raise InputError(
+            "/target/params", "poses of the character", "none", "Give a take that was retargeted."
+        )
+    return take.params
+
+
+def outline(motion: MeshSequence) -> FloatArray:
+    """Every frame in short, (T, D): where some of its vertices are."""
+    vertices = len(motion.neutral.vertices)
+    chosen = np.arange(0, vertices, max(1, vertices // _SAMPLED))
+    parts = [batch[:, chosen].reshape(len(batch), -1) for batch in motion.batches()]
+    return np.concatenate(parts)
+
+
+def choose_frames(poses: FloatArray, count: int) -> list[int]:
+    """Frames whose poses (T, P) are far from each other, in order of time; NaN rows are left out.
+
+    The first is the pose nearest to rest, each next one the farthest from all before.
+    """
+    known = np.flatnonzero(~np.isnan(poses).any(axis=1))
+    if not len(known):
+        raise InputError(
+            "/target/params", "a pose in at least one frame", "none", "Retarget the take first."
+        )
+    poses = poses[known] / np.maximum(np.ptp(poses[known], axis=0), 1e-9)
+    distance = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
+    chosen = [int(distance.argmin())]
+    distance = np.full(len(poses), np.inf)
+    for _ in range(min(count, len(known)) - 1):
+        distance = np.minimum(distance, np.linalg.norm(poses - poses[chosen[-1]], axis=1))
+        chosen.append(int(distance.argmax()))
+    return sorted(int(frame) for frame in known[np.unique(chosen)])
+
+
+def require_same_length(faces: Sequence[Face]) -> None:
+    """Check that the same frame number means the same moment for all faces.
+
+    Raises
+    ------
+    InputError
+        Naming the first face that has another number of frames than the first.
+    """
+    expected = len(faces[0].motion)
+    for face in faces[1:]:
+        if len(face.motion) != expected:
+            raise InputError(
+                f"--{face.label}" if face.label == "truth" else face.label,
+                f"{expected} frames",
+                f"{len(face.motion)}",
+                "Give faces of the same performance.",
+            )
+
+
+def require_part(part: range, length: int) -> None:
+    """Check that a part of a performance lies in it.
+
+    Raises
+    ------
+    InputError
+        When it does not.
+    """
+    if not part or part.start < 0 or part.stop > length:
+        expected, found = f"a part of 0..{length - 1}", f"{part.start}..{part.stop - 1}"
+        raise InputError("--frames", expected, found, "Choose another.")
