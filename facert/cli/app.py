@@ -15,9 +15,12 @@ from facert.cli import (
     console,
     convert,
     demo,
+    drive,
     evaluate,
     inspect,
     plot,
+    points,
+    propagate,
     render,
     retarget,
     simulate,
@@ -68,6 +71,9 @@ def options(
 
 app.command("train")(train.command)
 app.command("retarget")(retarget.command)
+app.command("propagate")(propagate.command)
+app.command("drive")(drive.command)
+app.add_typer(points.app, name="points")
 app.command("convert")(convert.command)
 app.command("inspect")(inspect.command)
 app.command("simulate")(simulate.command)

@@ -1,0 +1,1 @@
+"""The experiments of Zhang, Li and Liang (2017), section 4, on real recordings."""

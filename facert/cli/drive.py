@@ -1,0 +1,122 @@
+"""``facert drive``: a few feature points move, the whole face follows."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+
+if TYPE_CHECKING:
+    from facert.data import MeshSequence
+
+ENDINGS = (".h5", ".hdf5", ".glb")
+
+
+class Fit(StrEnum):
+    """How points of another face are carried over."""
+
+    none = "none"
+    uniform = "uniform"
+    axes = "axes"
+
+
+def command(
+    mesh_path: Annotated[
+        Path, typer.Argument(metavar="MESH", help="The face at rest: a rig, .obj or .ply.")
+    ],
+    points_path: Annotated[
+        Path, typer.Argument(metavar="POINTS", help="A take whose markers are feature points.")
+    ],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT", help="A mesh sequence (.h5), or morph targets (.glb).")
+    ],
+    map_path: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="TOML", help="The vertex of each point: chin = 1204."),
+    ] = None,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="Each point drives the vertex nearest to it at rest.")
+    ] = False,
+    rest: Annotated[
+        int, typer.Option(min=0, help="The frame of POINTS in which their face rests.")
+    ] = 0,
+    fit: Annotated[
+        Fit, typer.Option(help="Carry over points of another face, scaled as a whole or by axis.")
+    ] = Fit.none,
+    carry: Annotated[
+        bool, typer.Option("--carry", help="Parts without a point follow the face rigidly.")
+    ] = False,
+    method: Annotated[
+        str,
+        typer.Option(
+            help="smooth, framework, literal (the paper's, as printed), laplacian, cotangent, "
+            "biharmonic, rbf-linear or rbf-thin-plate."
+        ),
+    ] = "smooth",
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+) -> None:
+    """Deform a face in every frame so that its feature points are where POINTS has them.
+
+    Points are named after their vertices, as in v1204, unless there is a map or --auto.
+    """
+    from facert.data import MeshSequence
+    from facert.errors import reading
+    from facert.io.formats import read_take_file
+    from facert.io.mesh import read_mesh
+    from facert.io.toml import read_toml
+    from facert.topology.driving import FaceDriver, LooseParts
+    from facert.topology.feature_points import Where, feature_points
+
+    _require_output(output, overwrite)
+    if auto and map_path:
+        raise typer.BadParameter("give --map or --auto, not both")
+    mesh, take = read_mesh(mesh_path, shapes), read_take_file(points_path)
+    where: Where = read_toml(map_path) if map_path else "nearest" if auto else "names"
+    with reading(points_path):
+        points = feature_points(take, mesh, where, rest, fit.value)
+    loose: LooseParts = "carry" if carry else "refuse"
+    with reading(mesh_path):
+        driver = FaceDriver(mesh.vertices, mesh.faces, points.vertices, method, loose)
+    sequence = MeshSequence(
+        mesh, take.time, lambda frames: driver.deform(points.positions[frames]), take.fps
+    )
+    said = _write(sequence, output, overwrite)
+    console.out.print(
+        f"{output}: {len(take)} frames of {len(mesh.vertices)} vertices, "
+        f"driven by {len(points.vertices)} points{said}",
+        markup=False,
+    )
+
+
+def _require_output(output: Path, overwrite: bool) -> None:
+    """Refuse a name that cannot be written to, before any work is done."""
+    from facert.errors import InputError, OutputExistsError
+
+    if output.suffix.lower() not in ENDINGS:
+        ending = repr(output.suffix) if output.suffix else "none"
+        expected = f"a name that ends in {', '.join(ENDINGS)}"
+        raise InputError("output", expected, ending, "Give another name.", where=str(output))
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+
+
+def _write(sequence: MeshSequence, output: Path, overwrite: bool) -> str:
+    """Write in the format of the name's ending; what there is to say about it."""
+    from facert.io.glb import write_glb
+    from facert.io.mesh_sequence import write_mesh_sequence
+    from facert.morphs import compact_morphs
+
+    if output.suffix.lower() != ".glb":
+        write_mesh_sequence(sequence, output, overwrite)
+        return ""
+    morphs = compact_morphs(sequence)
+    write_glb(morphs, output, overwrite)
+    unit = f" {sequence.neutral.units}" if sequence.neutral.units else ""
+    return f"; {len(morphs.names)} morph targets, off by {morphs.error:.2g}{unit} at most"

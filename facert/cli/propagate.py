@@ -1,0 +1,118 @@
+"""``facert propagate``: a few posed frames make the whole performance, without training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+
+if TYPE_CHECKING:
+    from facert.data import IntArray, Take
+
+
+def command(
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="A take: markers or weights, some frames posed.")
+    ],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="Result: .h5, .csv.")],
+    keys: Annotated[
+        str,
+        typer.Option(help="Key frames, as in 0,12,30; by default all that are posed."),
+    ] = "",
+    every: Annotated[
+        int | None, typer.Option(min=1, help="Instead: every so many frames, and the last.")
+    ] = None,
+    positions: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TAKE",
+            help="The character's feature points: its markers in the key frames, instead of poses.",
+        ),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            help="residual, path, framework (the paper's), laplacian, rbf-linear, "
+            "rbf-thin-plate, ridge, affine or spline."
+        ),
+    ] = "residual",
+    window: Annotated[
+        int | None, typer.Option(help="Frames of a window of time, odd.", show_default="9 or 15")
+    ] = None,
+    dim: Annotated[
+        int | None,
+        typer.Option(min=1, help="Directions of motion in a window.", show_default="5 or 3"),
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+) -> None:
+    """Write poses, or feature points, for every frame of a take from a few key frames."""
+    import numpy as np
+
+    from facert.errors import OutputExistsError, reading
+    from facert.io.formats import read_take_file, write_take_file
+    from facert.topology.takes import Propagation, propagate_poses, propagate_positions
+
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+    take = read_take_file(source, target)
+    how = Propagation(method, window, dim)
+    if positions is None:
+        with reading(source):
+            chosen = _keys(keys, every, take.labels, len(take))
+            result = propagate_poses(take, chosen, how)
+    else:
+        points = read_take_file(positions)
+        with reading(source):
+            seen = np.flatnonzero(points.source.valid.all(axis=1))
+            chosen = _keys(keys, every, seen, len(points))
+            result = propagate_positions(take, points, chosen, how)
+    write_take_file(result, output, overwrite)
+    console.out.print(f"{output}: {len(result)} frames from {len(chosen)} key frames", markup=False)
+    error = _error(result, take if positions is None else points, chosen)
+    if error:
+        console.out.print(error, markup=False)
+
+
+def _keys(keys: str, every: int | None, posed: IntArray, frames: int) -> list[int]:
+    """The key frames that are asked for, or all that are posed."""
+    from facert.errors import InputError
+    from facert.topology.keyed import even_keys
+
+    if keys and every:
+        raise typer.BadParameter("give --keys or --every, not both")
+    if every:
+        return [int(key) for key in even_keys(frames, every)]
+    if keys:
+        try:
+            return sorted({int(key) for key in keys.split(",")})
+        except ValueError:
+            raise typer.BadParameter("give frame numbers with commas, as in 0,12,30") from None
+    if len(posed) == frames:
+        raise InputError(
+            "--keys", "some frames", "a pose in all of them", "Choose with --keys or --every 10."
+        )
+    return [int(frame) for frame in posed]
+
+
+def _error(result: Take, truth: Take, keys: list[int]) -> str:
+    """How far off the frames are whose truth is known, besides the keys; nothing if none is."""
+    import numpy as np
+
+    from facert.metrics import rms
+
+    of_poses = result.params is not None and truth.params is not None
+    found = result.params if of_poses else result.source.values
+    known = truth.params if of_poses else truth.source.values
+    assert found is not None
+    assert known is not None
+    errors = (found - known).reshape(len(found), -1)
+    rest = np.setdiff1d(np.flatnonzero(~np.isnan(errors).any(axis=1)), keys)
+    if not len(rest):
+        return ""
+    return f"RMS against the {len(rest)} other frames that the input holds: {rms(errors[rest]):.4f}"

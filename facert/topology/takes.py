@@ -1,0 +1,180 @@
+"""Propagation on takes: which markers follow which, gaps filled, and a take again at the end."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, Source, Take
+from facert.errors import InputError
+from facert.gaps import fill_gaps
+from facert.names import NameIndex
+from facert.topology.keyed import KeyedPerformance
+from facert.topology.propagation import propagate
+
+log = logging.getLogger("facert")
+
+DEFAULT = "residual"
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """How to propagate; see `facert.topology.propagation.propagate`.
+
+    Parameters
+    ----------
+    method : str
+    width, dim : int, optional
+    """
+
+    method: str = DEFAULT
+    width: int | None = None
+    dim: int | None = None
+
+    def run(self, take: KeyedPerformance) -> FloatArray:
+        """All frames (T, G, C)."""
+        return propagate(take, self.method, self.width, self.dim)
+
+
+def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = None) -> Take:
+    """A take whose every frame has a pose, from the poses of its key frames.
+
+    Parameters
+    ----------
+    take : Take
+        Markers or weights, and poses in the key frames; other poses are not looked at.
+    keys : sequence of int
+        Frames.
+    how : Propagation, optional
+
+    Returns
+    -------
+    Take
+        Clipped to the controls' declared limits, if there are any.
+
+    Raises
+    ------
+    InputError
+        When a key frame has no pose, a marker is never observed, or the method cannot do it.
+    """
+    if take.params is None or take.controls is None:
+        raise InputError("/target/params", "poses of the key frames", "none", "Pose some frames.")
+    chosen = _keys_with(take.params[:, :1, None], keys, "/target/params")
+    source = filled_source(take.source)[:, None, :]  # one point: a rig follows the whole face
+    performance = KeyedPerformance(source, chosen, take.params[chosen][:, None, :])
+    params = (how or Propagation()).run(performance)[:, 0]
+    if take.controls.limits is not None:
+        params = np.clip(params, *take.controls.limits.T)
+    return replace(take, params=params, std=None)
+
+
+def propagate_positions(
+    take: Take, target: Take, keys: Sequence[int], how: Propagation | None = None
+) -> Take:
+    """The whole performance of a character's feature points, from their places in key frames.
+
+    Parameters
+    ----------
+    take : Take
+        The actor's markers or weights.
+    target : Take
+        The character's markers in the same frames, as its source; only the key frames count.
+    keys : sequence of int
+        Frames.
+    how : Propagation, optional
+
+    Returns
+    -------
+    Take
+        The character's markers in every frame, as its source. A marker follows that of the same
+        name; if some have none, all of them follow the whole face.
+
+    Raises
+    ------
+    InputError
+        When the takes differ in length, a marker is not seen in a key frame, or is never observed.
+    """
+    if target.source.kind != "markers" or len(target) != len(take):
+        raise InputError(
+            "the target take",
+            f"markers in {len(take)} frames",
+            f"{target.source.kind} in {len(target)}",
+            "Give the character's feature points, a row for each frame of the source.",
+        )
+    chosen = _keys_with(target.source.values, keys, "the target take's /source/markers")
+    labels = target.source.values[chosen]
+    partners = _partners(take.source, target.source)
+    flat = filled_source(take.source)
+    if partners is None:
+        performance = KeyedPerformance(flat[:, None, :], chosen, labels.reshape(len(chosen), 1, -1))
+    else:
+        points = flat.reshape(take.source.values.shape)[:, partners]
+        performance = KeyedPerformance(points, chosen, labels)
+    moved = (how or Propagation()).run(performance)
+    source = target.source.with_matrix(moved.reshape(len(take), -1))
+    return replace(
+        take,
+        source=source,
+        controls=None,
+        params=None,
+        std=None,
+        animation=None,
+        units=target.units,
+        up_axis=target.up_axis,
+    )
+
+
+def filled_source(source: Source) -> FloatArray:
+    """The source as a matrix without gaps, (T, D).
+
+    What a frame hides is guessed from what it shows, by all the other frames.
+
+    Raises
+    ------
+    InputError
+        For a marker or weight that is observed in no frame.
+    """
+    lost = np.flatnonzero(~source.valid.any(axis=0))
+    if len(lost):
+        raise InputError(
+            "/source",
+            "every marker seen in some frame",
+            f"{source.names[lost[0]]!r} in none ({len(lost)} such)",
+            "Remove it from the take.",
+        )
+    hidden = np.count_nonzero(~source.valid)
+    if hidden:
+        log.info("%d of %d positions were hidden: filled", hidden, source.valid.size)
+    return fill_gaps(source.matrix)
+
+
+def _keys_with(values: FloatArray, keys: Sequence[int], field: str) -> IntArray:
+    """The key frames, all of whose values (T, M, C) are there."""
+    chosen = np.asarray(keys, dtype=np.int64)
+    outside = chosen[(chosen < 0) | (chosen >= len(values))]
+    if len(outside):
+        raise InputError(
+            "--keys", f"frames from 0 to {len(values) - 1}", f"{outside[0]}", "Choose others."
+        )
+    bare = chosen[np.isnan(values[chosen]).any(axis=(1, 2))]
+    if len(bare):
+        raise InputError(
+            field,
+            "a whole pose in every key frame",
+            f"none in frame {bare[0]} ({len(bare)} such)",
+            "Pose it, or leave it out of --keys.",
+        )
+    return chosen
+
+
+def _partners(source: Source, target: Source) -> IntArray | None:
+    """For each target marker the source marker of its name; None unless all have one."""
+    index = NameIndex(source.names)
+    found = [index.find(name) for name in target.names]
+    if source.kind == "markers" and None not in found and len(set(found)) == len(found):
+        return np.array(found, dtype=np.int64)
+    log.info("not every target marker has a source marker of its name: all follow the whole face")
+    return None

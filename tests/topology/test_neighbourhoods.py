@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from facert.errors import InputError
+from facert.topology.neighbourhoods import (
+    Neighbourhoods,
+    adjacency,
+    given_lists,
+    mesh_rings,
+    temporal_windows,
+)
+
+
+def lists(neighbourhoods: Neighbourhoods) -> list[list[int]]:
+    parts = np.split(neighbourhoods.members, np.cumsum(neighbourhoods.sizes)[:-1])
+    return [sorted(part.tolist()) for part in parts]
+
+
+@given(frames=st.integers(1, 40), reach=st.integers(1, 12))
+def test_a_window_holds_the_frames_around_each_frame(frames, reach):
+    found = lists(temporal_windows(frames, 2 * reach + 1))
+    for frame, window in enumerate(found):
+        assert window == list(range(max(0, frame - reach), min(frames, frame + reach + 1)))
+
+
+@pytest.mark.parametrize("width", [0, 1, 4, -3])
+def test_a_window_has_a_middle(width):
+    with pytest.raises(InputError, match="odd"):
+        temporal_windows(10, width)
+
+
+def test_the_ring_of_a_vertex_is_itself_and_its_edges():
+    faces = np.array([[0, 1, 2], [1, 3, 2]])
+    assert lists(mesh_rings(faces, 4)) == [[0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3], [1, 2, 3]]
+
+
+def test_two_rings_are_the_rings_of_the_ring(sheet):
+    points, faces = sheet
+    one, two = lists(mesh_rings(faces, len(points))), lists(mesh_rings(faces, len(points), 2))
+    for vertex, ring in enumerate(two):
+        assert ring == sorted({b for a in one[vertex] for b in one[a]})
+
+
+def test_doubled_degenerate_and_non_manifold_faces_change_nothing_else():
+    plain = np.array([[0, 1, 2], [1, 3, 2]])
+    doubled = np.concatenate([plain, plain, [[0, 0, 1]]])
+    assert lists(mesh_rings(doubled, 4)) == lists(mesh_rings(plain, 4))
+    three_at_an_edge = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    assert lists(mesh_rings(three_at_an_edge, 5))[0] == [0, 1, 2, 3, 4]
+
+
+def test_a_vertex_without_a_face_is_alone():
+    rings = mesh_rings(np.array([[0, 1, 2]]), 5)
+    assert lists(rings)[3:] == [[3], [4]]
+    assert rings.components.tolist() == [0, 0, 0, 1, 2]
+
+
+def test_adjacency_is_symmetric_without_loops(sheet):
+    points, faces = sheet
+    A = adjacency(faces, len(points)).toarray()
+    assert (A == A.T).all()
+    assert not A.diagonal().any()
+    assert set(np.unique(A)) == {0.0, 1.0}
+
+
+def test_components_are_what_neighbourhoods_join(two_sheets):
+    points, faces = two_sheets
+    components = mesh_rings(faces, len(points)).components
+    assert components.tolist() == [0] * 72 + [1] * 72
+    assert given_lists([[0, 1], [2, 3], [1, 3]], 5).components.tolist() == [0, 0, 0, 0, 1]
+
+
+def test_groups_by_size_hold_every_neighbourhood_once(sheet):
+    points, faces = sheet
+    rings = mesh_rings(faces, len(points))
+    grouped = [sorted(row) for members in rings.by_size() for row in members.tolist()]
+    assert sorted(grouped) == sorted(lists(rings))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [([[0, 9]], "found 9"), ([[0, -1]], "found -1"), ([[]], "empty"), ([[0, 1, 0]], "0 twice")],
+)
+def test_bad_lists_are_refused(given, expected):
+    with pytest.raises(InputError, match=expected):
+        given_lists(given, 3)
+
+
+def test_faces_use_vertices_that_exist_and_a_ring_is_at_least_one():
+    with pytest.raises(InputError, match="/faces"):
+        mesh_rings(np.array([[0, 1, 7]]), 4)
+    with pytest.raises(InputError, match="rings"):
+        mesh_rings(np.array([[0, 1, 2]]), 4, 0)

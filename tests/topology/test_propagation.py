@@ -1,0 +1,157 @@
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline, RBFInterpolator
+
+from facert.errors import InputError
+from facert.topology.keyed import KeyedPerformance, even_keys
+from facert.topology.propagation import METHODS, propagate
+
+FREE_OF_SPACE = ["residual", "path", "framework", "laplacian", "ridge", "rbf-linear", "spline"]
+
+
+def performance(frames=60, points=7, every=8, seed=0, params=False):
+    """A walk in four dimensions moves the points; the target follows it nonlinearly."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(frames)[:, None] / 30.0
+    walk = np.sin(t * [2.0, 3.1, 4.3, 5.7] + rng.uniform(0, 6, 4))
+    rest = 3.0 * rng.normal(size=(points, 3))
+    shapes = 0.3 * rng.normal(size=(4, points, 3))
+    source = rest + np.tensordot(walk, shapes, axes=1)
+    truth = 2.0 * (rest + np.tensordot(walk + 0.1 * walk**2, shapes, axes=1))
+    truth = truth.reshape(frames, 1, -1)[:, :, :5] if params else truth
+    keys = even_keys(frames, every)
+    return KeyedPerformance(source, keys, truth[keys]), truth
+
+
+def error(found, truth):
+    return np.sqrt(np.mean((found - truth) ** 2) / np.mean((truth - truth.mean(axis=0)) ** 2))
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_key_poses_are_met(method):
+    take, truth = performance()
+    found = propagate(take, method)
+    assert found.shape == truth.shape
+    tolerance = 0.3 if method in ("ridge", "affine") else 1e-6
+    np.testing.assert_allclose(found[take.keys], take.labels, atol=tolerance)
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "laplacian"])
+def test_parameters_follow_the_whole_face(method):
+    take, truth = performance(params=True, every=2 if method == "rbf-thin-plate" else 8)
+    assert error(propagate(take, method), truth) < 0.9
+    if method in ("residual", "ridge", "affine"):
+        assert error(propagate(take, method), truth) < 0.1
+
+
+def test_the_frameworks_follow_better_than_time_or_distance_alone():
+    take, truth = performance(frames=90, every=10)
+    errors = {name: error(propagate(take, name), truth) for name in METHODS}
+    assert errors["framework"] < 0.5 * errors["rbf-linear"]
+    assert errors["framework"] < 0.7 * errors["spline"]
+    assert errors["residual"] < min(errors["framework"], errors["ridge"])
+
+
+@pytest.mark.parametrize("method", FREE_OF_SPACE)
+def test_how_the_actor_turned_and_in_what_unit_does_not_matter(turn, method):
+    take, _ = performance()
+    placed = 100.0 * take.source @ turn + [4.0, 5.0, 6.0]
+    if method in ("residual", "ridge", "laplacian"):  # these know that source and target correspond
+        placed = 100.0 * take.source + [4.0, 5.0, 6.0]
+    moved = KeyedPerformance(placed, take.keys, take.labels)
+    np.testing.assert_allclose(propagate(moved, method), propagate(take, method), atol=1e-8)
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_labels_moved_and_scaled_move_and_scale_the_target(method):
+    take, _ = performance()
+    moved = KeyedPerformance(take.source, take.keys, 3.0 * take.labels + [1.0, -2.0, 4.0])
+    expected = 3.0 * propagate(take, method) + [1.0, -2.0, 4.0]
+    np.testing.assert_allclose(propagate(moved, method), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_the_order_of_keys_and_of_points_does_not_matter(method):
+    take, _ = performance()
+    rng = np.random.default_rng(0)
+    keys, points = rng.permutation(len(take.keys)), rng.permutation(7)
+    mixed = KeyedPerformance(take.source[:, points], take.keys[keys], take.labels[keys][:, points])
+    found = propagate(mixed, method)
+    np.testing.assert_allclose(found, propagate(take, method)[:, points], atol=1e-8)
+
+
+def test_affine_relations_are_found_exactly_by_the_framework_and_the_regression(monkeypatch):
+    monkeypatch.setattr("facert.topology.propagation.STILL", 1e-6)  # all directions count
+    take, _ = performance()
+    rng = np.random.default_rng(5)
+    maps = rng.normal(size=(7, 3, 3))
+    truth = np.einsum("tpc,pcd->tpd", take.source, maps) + rng.normal(size=(7, 3))
+    exact = KeyedPerformance(take.source, take.keys, truth[take.keys])
+    np.testing.assert_allclose(propagate(exact, "framework"), truth, atol=1e-6)
+    np.testing.assert_allclose(propagate(exact, "affine"), truth, atol=1e-6)
+
+
+def test_the_baselines_are_the_ones_of_scipy():
+    take, _ = performance()
+    spline = CubicSpline(take.keys, take.labels)(np.arange(len(take)))
+    np.testing.assert_allclose(propagate(take, "spline"), spline, atol=1e-12)
+    for name, kernel in (("rbf-linear", "linear"), ("rbf-thin-plate", "thin_plate_spline")):
+        X = take.source[:, 3]
+        expected = RBFInterpolator(X[take.keys], take.labels[:, 3], kernel=kernel)(X)
+        np.testing.assert_allclose(propagate(take, name)[:, 3], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["residual", "path", "laplacian", "ridge", "affine", "spline"])
+def test_still_and_repeated_frames_do_no_harm(method):
+    take, truth = performance()
+    held = np.minimum(np.arange(60), 25)  # the second half stands still
+    still = KeyedPerformance(take.source[held], take.keys, truth[held][take.keys])
+    assert error(propagate(still, method), truth[held]) < 0.25
+
+
+def test_windows_change_the_result_where_there_are_windows():
+    take, _ = performance()
+    assert not np.allclose(propagate(take, "path", width=5), propagate(take, "path"))
+    assert not np.allclose(propagate(take, "path", dim=1), propagate(take, "path"))
+    with pytest.raises(InputError, match="neither with spline"):
+        propagate(take, "spline", width=5)
+    with pytest.raises(InputError, match="odd"):
+        propagate(take, "path", width=4)
+    with pytest.raises(InputError, match="one of residual, path"):
+        propagate(take, "magic")
+
+
+def test_too_few_keys_are_refused():
+    take, truth = performance()
+    with pytest.raises(InputError, match="2 key frames or more"):
+        KeyedPerformance(take.source, np.array([3]), truth[[3]])
+    few = KeyedPerformance(take.source, np.array([0, 20, 40]), truth[[0, 20, 40]])
+    with pytest.raises(InputError, match="4 or more in each connected component"):
+        propagate(few, "framework")
+    assert np.isfinite(propagate(few, "path")).all()
+
+
+def test_bad_keys_and_labels_are_named():
+    take, truth = performance()
+    source = take.source
+    with pytest.raises(InputError, match="from 0 to 59"):
+        KeyedPerformance(source, np.array([0, 60]), truth[[0, 1]])
+    with pytest.raises(InputError, match="5 twice"):
+        KeyedPerformance(source, np.array([5, 5]), truth[[5, 5]])
+    with pytest.raises(InputError, match="NaN"):
+        KeyedPerformance(source, np.array([0, 5]), np.full((2, 7, 3), np.nan))
+    with pytest.raises(InputError, match="1 or 7"):
+        KeyedPerformance(source, np.array([0, 5]), truth[[0, 5]][:, :4])
+    frozen = KeyedPerformance(source[np.zeros(60, int)], take.keys, take.labels)
+    with pytest.raises(InputError, match="two at one place"):
+        propagate(frozen, "rbf-linear")
+    flat, _ = performance(params=True)
+    with pytest.raises(InputError, match="a target position for each source marker"):
+        propagate(flat, "laplacian")
+
+
+def test_even_keys_hold_the_first_and_the_last_frame():
+    assert even_keys(100, 30).tolist() == [0, 30, 60, 90, 99]
+    assert even_keys(61, 30).tolist() == [0, 30, 60]
+    with pytest.raises(InputError, match="--every"):
+        even_keys(10, 0)
