@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,14 +11,13 @@ import typer
 
 from facert.cli import console
 from facert.errors import InputError, OutputExistsError, reading
+from facert.methods import REGISTRY
 
 if TYPE_CHECKING:
     from facert.data import Take
-    from facert.evaluation.cells import Outcome
     from facert.evaluation.protocol import Problem
     from facert.evaluation.run import Grid
     from facert.evaluation.summary import Row
-    from facert.io.journal import Journal
 
 BUILT_IN = "the built-in take"
 
@@ -40,7 +37,9 @@ def command(
     labels: Annotated[
         str, typer.Option(help="Labelled frames: a..b, a..b:step, or numbers with commas.")
     ] = "10..40",
-    methods: Annotated[str, typer.Option(help="all, or names with commas.")] = "all",
+    methods: Annotated[
+        str, typer.Option(help="all, or names with commas, of " + ", ".join(REGISTRY) + ".")
+    ] = "all",
     repeats: Annotated[int, typer.Option(min=1, help="Random draws of each.")] = 20,
     unlabelled: Annotated[
         str, typer.Option(help="Unlabelled frames, and as many poses: one number, range or list.")
@@ -87,6 +86,7 @@ def command(
     if across is not None and split is not Split.random:
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
+    from facert.cli.evaluation_run import open_journal, run_cells
     from facert.cli.evaluation_table import error_table
     from facert.cli.pictures import save_picture
     from facert.cli.ranges import parse_range
@@ -111,15 +111,17 @@ def command(
             None if across is None else _read(across, target),
             None if rig is None else read_rig_file(rig, shapes),
         )
-        journal = _journal(problem, json_path)
-        outcomes = _run(problem, grid, jobs or os.cpu_count() or 1, journal)
+        journal = open_journal(problem, json_path)
+        outcomes = run_cells(problem, grid, jobs, journal)
     rows = summarise(outcomes, protocol)
     title = _title(_name(take, target), across, problem, grid)
     console.out.print(error_table(rows, title))
     if json_path is not None:
         files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
         _write_json(json_path, {**_plain(files), **_facts(problem, grid)}, rows, overwrite)
-    if plot is not None and any(row.rms is not None for row in rows):
+    if plot is not None and all(row.rms is None for row in rows):
+        console.log.warning("%s: not drawn, as no method could run", plot)
+    elif plot is not None:
         save_picture(plot_errors(rows, title), plot, overwrite)
     if journal is not None:
         journal.remove()
@@ -138,8 +140,6 @@ def _require_outputs(json_path: Path | None, plot: Path | None, overwrite: bool)
 
 def _methods(text: str) -> tuple[str, ...]:
     """The names in the option, each once."""
-    from facert.methods import REGISTRY
-
     if text == "all":
         return tuple(REGISTRY)
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
@@ -157,47 +157,6 @@ def _read(path: Path | None, target: str | None) -> Take:
     return training_take(posed=None) if path is None else read_take_file(path, target=target)
 
 
-def _journal(problem: Problem, json_path: Path | None) -> Journal | None:
-    """Where finished cells are kept: beside the JSON file, if there is to be one."""
-    import facert
-    from facert.evaluation.run import fingerprint
-    from facert.io.journal import Journal, source_digest
-
-    if json_path is None:
-        return None
-    code = source_digest(Path(facert.__file__).parent)
-    return Journal(json_path.with_suffix(".cells.jsonl"), fingerprint(problem) + code)
-
-
-def _run(problem: Problem, grid: Grid, jobs: int, journal: Journal | None) -> list[Outcome]:
-    """Evaluate all cells."""
-    from facert.evaluation.run import run
-
-    try:
-        return list(_watched(run(problem, grid, jobs=jobs, journal=journal), len(grid.cells)))
-    except KeyboardInterrupt:
-        if journal is not None:
-            console.log.warning("the same command continues from %s", journal.path)
-        raise
-
-
-def _watched(outcomes: Iterator[Outcome], total: int) -> Iterator[Outcome]:
-    """A bar on a terminal; elsewhere a line for every tenth."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-    notes = console.log.isEnabledFor(logging.INFO)
-    terminal = console.err.is_terminal
-    columns = (BarColumn(), MofNCompleteColumn(), "cells", TimeRemainingColumn())
-    bar = Progress(*columns, console=console.err, transient=True, disable=not (terminal and notes))
-    with bar:
-        task = bar.add_task("", total=total)
-        for done, outcome in enumerate(outcomes, start=1):
-            yield outcome
-            bar.advance(task)
-            if not terminal and 10 * done // total > 10 * (done - 1) // total:
-                console.log.info("%d of %d cells", done, total)
-
-
 def _name(take: Path | None, target: str | None) -> str:
     if take is None:
         return BUILT_IN
@@ -207,7 +166,9 @@ def _name(take: Path | None, target: str | None) -> str:
 def _title(name: str, across: Path | None, problem: Problem, grid: Grid) -> str:
     protocol = problem.protocol
     tested = f"tested on {across.name}" if across is not None else f"{protocol.split} split"
-    parts = [name, tested, f"{grid.repeats} draws"]
+    parts = [name, tested, f"{grid.repeats} {'draw' if grid.repeats == 1 else 'draws'}"]
+    if len(grid.unlabelled) == 1:
+        parts.append(f"{grid.unlabelled[0]} unlabelled")
     if protocol.noise:
         parts.append(f"noise {protocol.noise:g}")
     if protocol.missing:

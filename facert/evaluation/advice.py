@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
 
 from facert.data import FloatArray
 from facert.evaluation.cells import Outcome
+from facert.evaluation.comparison import Estimate, errors_by_method
 
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
 RECENT = 3  # numbers of labels that the gain of more is judged by
-LEAST = 1e-12  # an RMS below this is as good as none; its logarithm must be finite
 
 
 def advise(outcomes: Sequence[Outcome]) -> str:
@@ -26,7 +25,7 @@ def advise(outcomes: Sequence[Outcome]) -> str:
     most = max(outcome.cell.unlabelled for outcome in outcomes)
     outcomes = [outcome for outcome in outcomes if outcome.cell.unlabelled == most]
     labels = sorted({outcome.cell.labels for outcome in outcomes if outcome.scores is not None})
-    errors = _errors_by_method([o for o in outcomes if o.cell.labels in labels])
+    errors = errors_by_method([o for o in outcomes if o.cell.labels in labels])
     if not errors:
         return "No method could run every draw: see the notes below the table."
     logs = {method: np.log(table).mean(axis=0) for method, table in errors.items()}
@@ -51,22 +50,7 @@ def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
     return f"{seen}; at this rate {2 * labels[-1]} labels would take off another {gain:.0%}."
 
 
-def _errors_by_method(outcomes: Sequence[Outcome]) -> dict[str, FloatArray]:
-    """RMS (labels, repeats) of each method that ran every cell."""
-    labels = len({outcome.cell.labels for outcome in outcomes})
-    repeats = len({outcome.cell.repeat for outcome in outcomes})
-    found: dict[str, list[float]] = defaultdict(list)
-    for outcome in sorted(outcomes, key=lambda o: (o.cell.labels, o.cell.repeat)):
-        if outcome.scores is not None:
-            found[outcome.cell.method].append(max(outcome.scores.rms, LEAST))
-    return {
-        method: np.array(values).reshape(labels, repeats)
-        for method, values in found.items()
-        if len(values) == labels * repeats
-    }
-
-
 def _ties(behind: FloatArray) -> bool:
     """Whether a distance, one number a repeat, is within its standard error."""
-    repeats = len(behind)
-    return repeats > 1 and bool(behind.mean() <= behind.std(ddof=1) / repeats**0.5)
+    distance = Estimate.of(behind)
+    return distance.value <= distance.se

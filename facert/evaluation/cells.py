@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -15,9 +16,9 @@ from facert.data import Take
 from facert.errors import FacertError
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
 from facert.metrics import Scores, score
-from facert.retargeter import train
 from facert.settings import Settings
 from facert.threads import threads_for
+from facert.training import train
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Outcome:
         Mapping, milliseconds a frame, all frames at once.
     failure : str
         Why the method could not run; empty when it did.
+    details : str
+        The traceback of a failure that nobody foresaw; empty for others.
     """
 
     cell: Cell
@@ -52,6 +55,7 @@ class Outcome:
     fit_seconds: float = 0.0
     frame_ms: float = 0.0
     failure: str = ""
+    details: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for a file."""
@@ -75,6 +79,8 @@ class Outcome:
 def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:
     """Train and test a method on the draw of its cell, on one thread.
 
+    Whatever goes wrong is told in the outcome: one cell never ends an evaluation.
+
     Parameters
     ----------
     problem : Problem
@@ -88,6 +94,9 @@ def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:
             return _evaluate(problem, cell, chosen, cell_settings(problem, cell, settings))
         except FacertError as error:
             return Outcome(cell, failure=str(error))
+        except Exception as error:
+            failure = " ".join(f"unexpected {type(error).__name__}: {error}".split())
+            return Outcome(cell, failure=failure, details=traceback.format_exc())
 
 
 def cell_settings(problem: Problem, cell: Cell, settings: Settings) -> Settings:

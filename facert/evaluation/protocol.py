@@ -55,7 +55,7 @@ class Protocol:
 
     def __post_init__(self) -> None:
         _check(self.split in get_args(Split), "split", "random or block", self.split)
-        _check(self.noise >= 0, "noise", "0 or more", self.noise)
+        _check(0 <= self.noise < np.inf, "noise", "0 or more", self.noise)
         _check(0 <= self.missing < 1, "missing", "a share from 0 to below 1", self.missing)
         _check(self.seed >= 0, "seed", "0 or more", self.seed)
         if self.test_frames is not None:
@@ -134,7 +134,7 @@ def make_problem(
     across : Take, optional
         Test on this one instead: the same controls, in any order.
     rig : Rig, optional
-        With a shape for every control.
+        With a shape, or a left and a right half of one, for every control.
 
     Raises
     ------
@@ -149,8 +149,7 @@ def make_problem(
             _check_posed(across)
             test = _with_controls(across, take.controls)
     if rig is not None:
-        with reading("the rig"):
-            gram = vertex_gram(rig, take.controls)
+        gram = vertex_gram(rig, take.controls)
     return Problem(take, test, protocol, gram)
 
 
@@ -182,7 +181,7 @@ def draw(problem: Problem, labels: int, unlabelled: int, repeat: int) -> Draw:
         candidates = np.setdiff1d(candidates, used)
     test = _capped(problem, candidates, repeat)
     if len(labelled) < labels or len(np.unique(used)) < len(used) or not len(test):
-        raise _too_short()
+        raise _too_short(labels, unlabelled, animation is not None, len(posed))
     return Draw(np.sort(labelled), np.sort(frames), np.sort(poses), test)
 
 
@@ -293,11 +292,13 @@ def _check_posed(take: Take) -> None:
         )
 
 
-def _too_short() -> InputError:
+def _too_short(labels: int, unlabelled: int, animated: bool, posed: int) -> InputError:
+    parts = [f"{labels} labels", f"{unlabelled} unlabelled frames"]
+    parts += [] if animated else [f"{unlabelled} unlabelled poses"]
     return InputError(
         "/target/params",
-        "enough posed frames for labels, unlabelled frames and poses, and a test",
-        "too few",
+        f"posed frames for {', '.join(parts)} and a test",
+        f"{posed} to draw from",
         "Ask for fewer labels or fewer unlabelled frames, or give a longer take.",
     )
 

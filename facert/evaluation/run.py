@@ -8,6 +8,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from itertools import product
 from multiprocessing import active_children, connection, get_context, parent_process
@@ -17,6 +18,7 @@ import numpy as np
 
 import facert
 from facert.data import Take
+from facert.errors import FacertError
 from facert.evaluation.cells import Cell, Outcome, evaluate
 from facert.evaluation.protocol import Problem, draw
 from facert.io.journal import Journal
@@ -73,14 +75,18 @@ def run(
     jobs : int
         Processes; 1 stays in this one. The outcomes do not depend on it, apart from the times.
     journal : Journal, optional
-        Cells that it holds are not evaluated again; others are added to it.
+        Cells that it holds are not evaluated again; others are added to it, but for those that
+        failed in a way that nobody foresaw: the next run tries them again.
 
     Raises
     ------
     InputError
         When the take is too short for the largest cell.
+    FacertError
+        When a process was killed.
     """
-    draw(problem, max(grid.labels), max(grid.unlabelled), repeat=0)
+    for repeat in range(min(grid.repeats, 2)):  # the two halves of a split by blocks
+        draw(problem, max(grid.labels), max(grid.unlabelled), repeat)
     settings = settings or Settings()
     cells = grid.cells
     kept = _kept(journal, set(cells))
@@ -92,7 +98,9 @@ def run(
     else:
         outcomes = (evaluate(problem, cell, settings) for cell in waiting)
     for outcome in outcomes:
-        if journal is not None:
+        if outcome.details:
+            log.debug("%s\n%s", outcome.cell, outcome.details)
+        elif journal is not None:
             journal.add(outcome.as_dict())
         yield outcome
 
@@ -141,6 +149,10 @@ def _in_processes(
     try:
         for future in as_completed([pool.submit(_evaluate_shared, cell) for cell in cells]):
             yield future.result()
+    except BrokenProcessPool:
+        raise FacertError(
+            "a process of the evaluation was killed; if for lack of memory, use fewer --jobs"
+        ) from None
     except BaseException:
         # Not asked to end but ended: a second Ctrl-C while they finish would leave them hanging.
         for process in set(active_children()) - strangers:

@@ -5,6 +5,7 @@ import pytest
 from facert.cli.ranges import default_step, parse_range
 from facert.errors import InputError
 from facert.io.take import write_take
+from facert.methods import REGISTRY
 
 
 @pytest.fixture
@@ -73,6 +74,20 @@ def test_a_method_that_cannot_run_says_so_in_its_row(facert, take):
     assert "RMS" in outcome.out.splitlines()[-1]
 
 
+def test_an_unexpected_error_is_in_its_row_and_its_place_in_the_details(
+    facert, take, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(REGISTRY, "broken", ("linear", "NoSuchClass"))
+    picture = tmp_path / "out.png"
+    outcome = facert("-v", "eval", take, *QUICK, "--methods", "broken", "--plot", picture)
+    assert outcome.code == 0, outcome.err
+    assert "broken with 4 labels: unexpected AttributeError" in outcome.out
+    assert "Traceback" in outcome.err
+    assert "4 cells failed unexpectedly" in outcome.err
+    assert "out.png: not drawn, as no method could run" in outcome.err
+    assert not picture.exists()
+
+
 def test_another_take_is_tested(facert, take, make_take, tmp_path):
     other = tmp_path / "other.h5"
     write_take(make_take(frames=50, posed=50, animation=0), other)
@@ -96,8 +111,9 @@ def test_existing_outputs_are_kept(facert, take, tmp_path):
     [
         (("--methods", "magic"), "--methods: expected all, or some of"),
         (("--labels", "x"), "--labels"),
-        (("--labels", "90"), "fewer labels"),
+        (("--labels", "90"), "90 labels, 10 unlabelled frames, 10 unlabelled poses and a test"),
         (("--noise", -1), "noise"),
+        (("--noise", "inf"), "noise"),
         (("--missing", 2), "missing"),
         (("--across", "none.h5"), "none.h5"),
     ],
@@ -124,3 +140,14 @@ def test_a_real_track_is_evaluated(facert, real_data):
     outcome = facert("eval", track, "--target", "arkit", *QUICK)
     assert outcome.code == 0, outcome.err
     assert "utterance_a.npz (arkit), random split" in outcome.out
+
+
+@pytest.mark.real
+def test_a_rig_is_matched_in_its_own_spelling(facert, real_data):
+    track, rig = real_data / "tracks" / "utterance_a.npz", real_data / "rigs" / "ict_face.npz"
+    outcome = facert("eval", track, "--target", "arkit", "--rig", rig, *QUICK)
+    assert outcome.code == 0, outcome.err
+    assert "vertex" in outcome.out
+    outcome = facert("eval", track, "--target", "units", "--rig", rig, *QUICK)
+    assert outcome.code == 3
+    assert "controls that the rig has a shape for, found 'eye-left-closure'" in outcome.err

@@ -149,7 +149,7 @@ def test_what_does_not_fit_together_is_refused(make, make_take):
     with pytest.raises(InputError, match="take to test on: /target/params: expected known poses"):
         make_problem(posed, Protocol(), across=unposed)
     rig = Rig(np.zeros((3, 3)), np.zeros((1, 3, 3)), ["jaw"], np.array([[0, 1, 2]]))
-    with pytest.raises(InputError, match="the rig: /names: expected the name 'smile'"):
+    with pytest.raises(InputError, match="controls that the rig has a shape for, found 'smile'"):
         make_problem(posed, Protocol(), rig=rig)
     with pytest.raises(InputError, match="fewer labels"):
         draw(make(posed), 20, 30, 0)

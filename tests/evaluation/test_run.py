@@ -1,4 +1,6 @@
 import json
+import logging
+from dataclasses import replace
 from itertools import islice
 from multiprocessing import active_children
 
@@ -19,6 +21,7 @@ from facert.evaluation.protocol import (
 )
 from facert.evaluation.run import Grid, fingerprint, run
 from facert.io.journal import Journal
+from facert.methods import REGISTRY
 from facert.metrics import rms
 
 GRID = Grid(methods=("nearest", "ridge"), labels=(4, 6), unlabelled=(10,), repeats=2)
@@ -64,6 +67,29 @@ def test_a_method_that_cannot_run_says_why_and_the_others_go_on(make, quick):
     assert few.scores is None
     assert "at least 3 posed frames" in few.failure
     assert enough.scores is not None
+
+
+def test_an_error_that_nobody_foresaw_fails_its_cell_and_is_tried_again(
+    make, quick, tmp_path, caplog, monkeypatch
+):
+    monkeypatch.setitem(REGISTRY, "broken", ("linear", "NoSuchClass"))
+    journal = Journal(tmp_path / "cells.jsonl", "")
+    with caplog.at_level(logging.DEBUG, "facert"):
+        broken, ridge = run(make(), Grid(("broken", "ridge"), (5,), (5,), 1), quick, 1, journal)
+    assert broken.failure.startswith("unexpected AttributeError: module 'facert.methods.linear'")
+    assert "Traceback" in caplog.text
+    assert ridge.scores is not None
+    assert [Outcome.from_dict(entry) for entry in journal.begin()] == [ridge]
+
+
+def test_both_halves_of_a_split_by_blocks_must_do(make, make_take, quick):
+    take = make_take(frames=120, posed=120, animation=0)
+    params = take.params.copy()
+    params[12:24] = params[36:48] = np.nan  # of the second half alone
+    problem = make(replace(take, params=params), split="block")
+    grid = Grid(("ridge",), (50,), (0,), repeats=2)
+    with pytest.raises(InputError, match=r"posed frames for 50 labels, .* found 36 to draw from"):
+        next(run(problem, grid, quick))
 
 
 def test_too_short_a_take_is_told_before_anything_runs(make, quick, tmp_path):

@@ -1,0 +1,62 @@
+"""How ``facert eval`` runs its cells: kept where they can be, with a bar on a terminal."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+import facert
+from facert.cli import console
+from facert.evaluation.cells import Outcome
+from facert.evaluation.protocol import Problem
+from facert.evaluation.run import Grid, fingerprint, run
+from facert.io.journal import Journal, source_digest
+
+
+def open_journal(problem: Problem, json_path: Path | None) -> Journal | None:
+    """Where finished cells are kept: beside the JSON file, if there is to be one."""
+    if json_path is None:
+        return None
+    code = source_digest(Path(facert.__file__).parent)
+    return Journal(json_path.with_suffix(".cells.jsonl"), fingerprint(problem) + code)
+
+
+def run_cells(
+    problem: Problem, grid: Grid, jobs: int | None, journal: Journal | None
+) -> list[Outcome]:
+    """Evaluate all cells; tells how to go on after Ctrl-C, and of failures nobody foresaw."""
+    try:
+        outcomes = run(problem, grid, jobs=jobs or _cores(), journal=journal)
+        done = list(_watched(outcomes, len(grid.cells)))
+    except KeyboardInterrupt:
+        if journal is not None:
+            console.log.warning("the same command continues from %s", journal.path)
+        raise
+    unforeseen = sum(bool(outcome.details) for outcome in done)
+    if unforeseen:
+        console.log.warning("%d cells failed unexpectedly: facert -v eval shows where", unforeseen)
+    return done
+
+
+def _cores() -> int:
+    """How many this process may use: fewer than there are in a container or on a cluster."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _watched(outcomes: Iterator[Outcome], total: int) -> Iterator[Outcome]:
+    """A bar on a terminal; elsewhere a line for every tenth."""
+    notes = console.log.isEnabledFor(logging.INFO)
+    terminal = console.err.is_terminal
+    columns = (BarColumn(), MofNCompleteColumn(), "cells", TimeRemainingColumn())
+    bar = Progress(*columns, console=console.err, transient=True, disable=not (terminal and notes))
+    with bar:
+        task = bar.add_task("", total=total)
+        for done, outcome in enumerate(outcomes, start=1):
+            yield outcome
+            bar.advance(task)
+            if not terminal and 10 * done // total > 10 * (done - 1) // total:
+                console.log.info("%d of %d cells", done, total)
