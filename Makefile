@@ -8,7 +8,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 DEMO ?= build/demo
 
-.PHONY: demo test check format bench clean
+.PHONY: demo test check format bench figures acceptance clean
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -39,6 +39,16 @@ format: $(VENV)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/python -m experiments.bench.training
 	$(BIN)/python -m experiments.bench.mapping
+	$(BIN)/python -m experiments.bench.topology
+
+# Both need the real recordings (FACERT_DATA), take their time, and continue where they stopped.
+figures: $(VENV)/.installed
+	$(BIN)/python -m experiments.figures
+
+acceptance: $(VENV)/.installed
+	$(BIN)/python -m experiments.default
+	$(BIN)/python -m experiments.default --split block
+	$(BIN)/python -m experiments.default --split across
 
 clean:
 	rm -rf build $(VENV)

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
-    from facert.retargeter import Retargeter, load, train
+    from facert.retargeter import Retargeter, load
     from facert.settings import Settings
+    from facert.training import train
 
 __version__ = "0.1.0"
 
@@ -55,7 +56,7 @@ _HOMES = {
     "load": ("facert.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
-    "train": ("facert.retargeter", "train"),
+    "train": ("facert.training", "train"),
     "write_take": ("facert.io.formats", "write_take_file"),
 }
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from facert.data import BoolArray, FloatArray, IntArray
@@ -14,6 +15,7 @@ from facert.data import BoolArray, FloatArray, IntArray
 ITERATIONS = 5
 RIDGE = 1e-6  # relative to the mean variance
 CHUNK = 2_000_000  # numbers in the systems that are solved at once
+Triangles = NDArray[np.floating]  # what NumPy says of Cholesky factors
 
 
 def fill_gaps(X: FloatArray) -> FloatArray:
@@ -76,10 +78,6 @@ class Gaussian:
     def fill(self, X: FloatArray) -> FloatArray:
         """Replace every NaN by its conditional mean given the rest of its frame.
 
-        Where h is hidden and s is seen, x_h = mean_h - P_hh⁻¹ P_hs (x_s - mean_s). The systems are
-        as large as what is hidden; frames that hide about as much, whatever it is, are solved in
-        one batch.
-
         Parameters
         ----------
         X : array, shape (n, d)
@@ -90,67 +88,106 @@ class Gaussian:
         array, shape (n, d)
             X itself where it is complete; observed values are never changed.
         """
-        hidden = np.isnan(X)
-        if not hidden.any():
-            return X
-        pull = np.where(hidden, 0.0, X - self.mean) @ self.precision
-        filled = np.where(hidden, self.mean, X)
-        for batch in _batches(hidden):
-            P_hh, rhs = batch.part(self.precision), batch.take(pull)[:, :, None]
-            batch.subtract(filled, np.linalg.solve(P_hh, rhs)[:, :, 0])
+        filled, _ = self.fill_for(X, np.empty((X.shape[1], 0)))
         return filled
+
+    def fill_for(self, X: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Fill frames, and tell how uncertain that leaves x B, a linear function of a frame.
+
+        Where h is hidden, s is seen, and P_hh = L Lᵀ,
+
+            x_h = mean_h - P_hh⁻¹ P_hs (x_s - mean_s),      cov(x_h) = P_hh⁻¹,
+            var((x B)_j) = |(L⁻¹ B_h)_j|².
+
+        The systems are as large as what is hidden; frames that hide about as much, whatever it is,
+        are solved in one batch.
+
+        Parameters
+        ----------
+        X : array, shape (n, d)
+            Frames; NaN: not observed.
+        B : array, shape (d, m)
+
+        Returns
+        -------
+        filled : array, shape (n, d)
+            X itself where it is complete; observed values are never changed.
+        variance : array, shape (n, m)
+            Zero for frames that are complete.
+        """
+        hidden = np.isnan(X)
+        variance = np.zeros((len(X), B.shape[1]))
+        if not hidden.any():
+            return X, variance
+        pull = _with_nothing(np.where(hidden, 0.0, X - self.mean) @ self.precision)
+        filled = _with_nothing(np.where(hidden, self.mean, X))
+        P, B = self._precision_with_nothing, np.pad(B, ((0, 1), (0, 0)))
+        for rows, columns in _batches(hidden, B.shape[1]):
+            L = np.linalg.cholesky(_blocks(P, columns))
+            pulled = _solve(L, pull[rows[:, None], columns][:, :, None])
+            filled[rows[:, None], columns] -= _solve_transposed(L, pulled)[:, :, 0]
+            if variance.size:
+                roots = _solve(L, B[columns])
+                variance[rows] = np.einsum("bhm,bhm->bm", roots, roots)
+        return filled[:, : X.shape[1]].copy(), variance
 
     def _doubt(self, hidden: BoolArray) -> FloatArray:
         """The conditional covariances P_hh⁻¹ of all frames, summed, (d, d)."""
-        total = np.zeros_like(self.covariance)
-        for batch in _batches(hidden):
-            batch.add_square(total, np.linalg.inv(batch.part(self.precision)))
-        return total
+        d, P = len(self.covariance), self._precision_with_nothing
+        total = np.zeros(P.size)
+        for _, columns in _batches(hidden):
+            places = columns[:, :, None] * len(P) + columns[:, None, :]
+            inverses = np.linalg.inv(_blocks(P, columns))
+            total += np.bincount(places.ravel(), inverses.ravel(), minlength=P.size)
+        return total.reshape(P.shape)[:d, :d]
+
+    @cached_property
+    def _precision_with_nothing(self) -> FloatArray:
+        """P with the row and column of nothing, (d + 1, d + 1), see `_batches`."""
+        return np.pad(self.precision, (0, 1))
 
 
-@dataclass(frozen=True, eq=False)
-class _Batch:
-    """B frames, and which h columns each of them hides.
+def _batches(hidden: BoolArray, width: int = 0) -> Iterator[tuple[IntArray, IntArray]]:
+    """The frames that hide anything, (n, d), those that hide most first, some at once.
 
-    A frame that hides fewer is filled up with columns that it shows; `real` tells them apart.
+    Each batch is the rows of its frames, (b,), and the columns that each of them hides, (b, h). A
+    frame that hides fewer than h is filled up with column d, which stands for nothing. Batches
+    are cut so that (h, h) and (h, width) numbers can be kept for each of their frames.
     """
-
-    rows: IntArray  # (B,)
-    columns: IntArray  # (B, h)
-    real: BoolArray  # (B, h)
-
-    def part(self, P: FloatArray) -> FloatArray:
-        """P_hh of each frame, (B, h, h), with the identity where it is filled up."""
-        blocks = P[self.columns[:, :, None], self.columns[:, None, :]]
-        return np.where(self._both, blocks, np.eye(self.columns.shape[1]))
-
-    def take(self, X: FloatArray) -> FloatArray:
-        """The hidden entries of X (n, d), (B, h), with zero where they are filled up."""
-        return np.where(self.real, X[self.rows[:, None], self.columns], 0.0)
-
-    def subtract(self, X: FloatArray, values: NDArray[np.floating]) -> None:
-        """Take (B, h) from the hidden entries of X (n, d), in place."""
-        X[self.rows[:, None], self.columns] -= np.where(self.real, values, 0.0)
-
-    def add_square(self, total: FloatArray, blocks: NDArray[np.floating]) -> None:
-        """Add every frame's (h, h) to the hidden rows and columns of total (d, d), in place."""
-        places = self.columns[:, :, None] * len(total) + self.columns[:, None, :]
-        sums = np.bincount(places[self._both], blocks[self._both], minlength=total.size)
-        total += sums.reshape(total.shape)
-
-    @property
-    def _both(self) -> BoolArray:
-        return self.real[:, :, None] & self.real[:, None, :]
-
-
-def _batches(hidden: BoolArray) -> Iterator[_Batch]:
-    """The frames that hide anything, (n, d), those that hide most first."""
+    d = hidden.shape[1]
     counts = hidden.sum(axis=1)
     order = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
     first = 0
     while first < len(order):
         widest = int(counts[order[first]])
-        rows = order[first : first + max(CHUNK // widest**2, 1)]
+        rows = order[first : first + max(CHUNK // (widest * max(widest, width)), 1)]
         columns = np.argsort(~hidden[rows], axis=1, kind="stable")[:, :widest]
-        yield _Batch(rows, columns, np.take_along_axis(hidden[rows], columns, axis=1))
+        real = np.arange(widest) < counts[rows, None]
+        yield rows, np.where(real, columns, d)
         first += len(rows)
+
+
+def _with_nothing(X: FloatArray) -> FloatArray:
+    """X (n, d) with the column of nothing beside it, (n, d + 1), see `_batches`."""
+    return np.pad(X, ((0, 0), (0, 1)))
+
+
+def _blocks(P: FloatArray, columns: IntArray) -> FloatArray:
+    """P_hh of each frame, (b, h, h), with the identity where columns (b, h) stand for nothing."""
+    blocks = P.ravel().take(columns[:, :, None] * len(P) + columns[:, None, :])
+    np.einsum("bhh->bh", blocks)[...] += columns == len(P) - 1  # einsum: a view of the diagonals
+    return blocks
+
+
+def _solve(L: Triangles, rhs: FloatArray) -> FloatArray:
+    """L⁻¹ rhs for lower triangles L (b, h, h) and rhs (b, h, m)."""
+    lower, right = torch.from_numpy(L), torch.from_numpy(rhs)
+    solved: FloatArray = torch.linalg.solve_triangular(lower, right, upper=False).numpy()
+    return solved
+
+
+def _solve_transposed(L: Triangles, rhs: FloatArray) -> FloatArray:
+    """L⁻ᵀ rhs, see `_solve`."""
+    upper, right = torch.from_numpy(L).mT, torch.from_numpy(rhs)
+    solved: FloatArray = torch.linalg.solve_triangular(upper, right, upper=True).numpy()
+    return solved

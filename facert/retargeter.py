@@ -1,13 +1,12 @@
-"""From a take to a trained retargeter, and from a take and a retargeter to a performance.
+"""A trained retargeter: from a take to a performance, and to a model file and back.
 
-This is the one path of the data: take, normalised arrays, method, take. Nothing else normalises,
-and nothing else undoes it.
+This and `facert.training` are the one path of the data: take, normalised arrays, method, take.
+Nothing else normalises, and nothing else undoes it.
 """
 
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -19,23 +18,17 @@ import numpy as np
 import facert
 from facert.data import Controls, FloatArray, Source, SourceKind, Take
 from facert.errors import InputError, NumericalError, reading
-from facert.gplvm.noise import with_noise
 from facert.io.tensors import read_tensors, write_tensors
 from facert.methods import make_method
 from facert.methods.base import (
-    Labelled,
     Method,
     Prediction,
-    Report,
-    Unlabelled,
     stack_predictions,
 )
 from facert.names import NameIndex, match
 from facert.normalisation import Normalisation
-from facert.optim.monitor import Monitor
-from facert.settings import LimitRule, Settings
+from facert.settings import Settings
 from facert.threads import threads_for
-from facert.training_set import TrainingSet, choose_training_set
 
 log = logging.getLogger(__name__)
 
@@ -67,6 +60,8 @@ class Retargeter:
         To normalised units and back.
     figures : dict
         How training went, for people.
+    poses : array, shape (n, P), or None
+        Poses that the character is known to make, for `facert.posing`.
     """
 
     method: Method
@@ -78,6 +73,7 @@ class Retargeter:
     source_units: Normalisation
     target_units: Normalisation
     figures: dict[str, Any]
+    poses: FloatArray | None = None
 
     def retarget(self, take: Take, mode: Mode = "offline") -> Take:
         """The take with a pose in every frame, and a cleaned source.
@@ -161,6 +157,8 @@ class Retargeter:
             arrays["target.limits"] = self.controls.limits
         if self.bounds is not None:
             arrays["target.bounds"] = self.bounds
+        if self.poses is not None:
+            arrays["target.poses"] = self.poses
         metadata = {
             "format": FORMAT,
             "format_version": 1,
@@ -201,57 +199,6 @@ class Retargeter:
         return Source(values, self.source_names)
 
 
-def train(
-    take: Take, settings: Settings | None = None, monitor: Monitor | None = None
-) -> Retargeter:
-    """Learn to retarget from a take's labels, its other frames, and its animation.
-
-    Parameters
-    ----------
-    take : Take
-        With poses in some frames.
-    settings : Settings, optional
-        By default the semi-supervised shared GPLVM with the paper's dimensions.
-    monitor : Monitor, optional
-        Watches the training; see `facert.gplvm.training`.
-
-    Raises
-    ------
-    InputError
-        When the take has too few labels, or source or poses that never change.
-    """
-    settings = settings or Settings()
-    controls = take.controls
-    if controls is None:
-        raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
-    take = replace(take, source=_observed_part(take.source))
-    _warn_of_zeros(take.source)
-    data = choose_training_set(take, settings)
-    source_units = Normalisation.of(take.source.matrix, f"/source/{take.source.kind}")
-    settings = with_noise(settings, source_units.apply(_complete_frames(take.source, data)))
-    poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
-    target_units = Normalisation.of(poses, "/target/params")
-    labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
-    unlabelled = Unlabelled(
-        source_units.apply(data.X_unlabelled), target_units.apply(data.Y_unlabelled)
-    )
-    method = make_method(settings)
-    began = time.perf_counter()
-    report = method.fit(labelled, unlabelled, monitor or Monitor())
-    seconds = time.perf_counter() - began
-    return Retargeter(
-        method=method,
-        source_kind=take.source.kind,
-        source_names=take.source.names,
-        units=take.units,
-        controls=controls,
-        bounds=_bounds(take, data.Y_labelled, settings.limits),
-        source_units=source_units,
-        target_units=target_units,
-        figures=_figures(report, seconds, labelled),
-    )
-
-
 def load(path: str | Path) -> Retargeter:
     """Read a retargeter from a model file.
 
@@ -289,41 +236,10 @@ def load(path: str | Path) -> Retargeter:
             source_units,
             target_units,
             dict(metadata.get("figures", {})),
+            arrays.get("target.poses"),
         )
         _check_fit(retargeter, arrays)
     return retargeter
-
-
-def _observed_part(source: Source) -> Source:
-    """The source without markers or weights that no frame shows: nothing can be learned of them."""
-    seen = np.asarray(source.valid.any(axis=0))
-    if seen.all():
-        return source
-    silent = [name for name, there in zip(source.names, seen, strict=True) if not there]
-    log.warning("never observed in the take, left out: %s", ", ".join(silent))
-    names = tuple(name for name, there in zip(source.names, seen, strict=True) if there)
-    return Source(source.values[:, seen], names)
-
-
-def _bounds(take: Take, labelled: FloatArray, rule: LimitRule) -> FloatArray | None:
-    """What poses are clipped to, (P, 2): declared limits, or the range of all poses allowed.
-
-    These are the poses of the labelled frames (l, P) and all of the animation.
-    """
-    declared = take.controls.limits if take.controls is not None else None
-    if rule == "none":
-        return None
-    if rule == "declared" or declared is not None:
-        return declared
-    poses = labelled if take.animation is None else np.vstack([labelled, take.animation])
-    return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
-
-
-def _complete_frames(source: Source, data: TrainingSet) -> FloatArray:
-    """Frames that show everything, (n, d); where they are few, the filled ones of the training."""
-    complete = source.matrix[~np.isnan(source.matrix).any(axis=1)]
-    filled = np.vstack([data.X_labelled, data.X_unlabelled])
-    return complete if len(complete) > len(filled) else filled
 
 
 def _check_distance(frames: FloatArray) -> None:
@@ -346,31 +262,6 @@ def _check_distance(frames: FloatArray) -> None:
         log.warning("the source lies far from the training take: check units and head motion")
 
 
-def _warn_of_zeros(source: Source) -> None:
-    """Some systems write (0, 0, 0) for a marker that was lost."""
-    if source.kind != "markers":
-        return
-    zeros = int(np.sum(~source.values.any(axis=2)))
-    if zeros:
-        log.warning("%d marker positions are exactly (0, 0, 0): lost ones should be NaN", zeros)
-
-
-def _figures(report: Report, seconds: float, labelled: Labelled) -> dict[str, Any]:
-    figures: dict[str, Any] = {
-        "labelled frames": len(labelled.X),
-        "seconds": seconds,
-    }
-    result = report.result
-    if result is not None:
-        figures |= {
-            "objective": result.value,
-            "gradient norm": result.gradient_norm,
-            "iterations": result.iterations,
-            "status": result.status,
-        }
-    return figures | dict(report.figures)
-
-
 def library_versions() -> dict[str, str]:
     """Versions of what computed a result, for its metadata."""
     return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
@@ -383,6 +274,7 @@ def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None
         raise _misfit("source_kind", "markers or weights", repr(kind))
     if len(set(names)) < len(names):
         raise _misfit("source_names", "names that are all different", "one of them twice")
+    _check_poses(retargeter.poses, len(retargeter.controls.names))
     columns = len(names) * (3 if kind == "markers" else 1), len(retargeter.controls.names)
     for view, count, learned in zip(
         ("source", "target"), columns, retargeter.method.dimensions, strict=True
@@ -394,6 +286,12 @@ def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None
             raise _misfit(f"{view}.observations", f"{count} columns", f"{learned}")
         if not scale.item() > 0.0:
             raise _misfit(f"{view}.scale", "a number above 0", f"{scale.item()}")
+
+
+def _check_poses(poses: FloatArray | None, controls: int) -> None:
+    """A file of an earlier version has none."""
+    if poses is not None and (poses.ndim != 2 or poses.shape[1] != controls):
+        raise _misfit("target.poses", f"{controls} columns", f"shape {poses.shape}")
 
 
 def _misfit(field: str, expected: str, found: str) -> InputError:

@@ -25,8 +25,10 @@ class Settings:
         Name in the registry of methods.
     labels : int, optional
         Use only so many of the posed frames, drawn at random; by default all of them.
-    unlabelled : int
-        Frames without a pose and poses without a frame used in training, at most so many of each.
+    unlabelled : int, optional
+        Frames without a pose and poses without a frame used in training, at most so many of each,
+        drawn at random; by default as many as the method has use for: 100 for the shared Gaussian
+        process models, all for the others.
     seed : int
         For every random choice.
     latent_dim : int
@@ -59,9 +61,9 @@ class Settings:
         Where training runs: ``"cpu"`` or a torch CUDA device.
     """
 
-    method: str = "ssgplvm"
+    method: str = "auto"
     labels: int | None = None
-    unlabelled: int = 100
+    unlabelled: int | None = None
     seed: int = 0
     latent_dim: int = 8
     neighbours: int = 8
@@ -82,9 +84,9 @@ class Settings:
             _check_type(field.name, getattr(self, field.name), hints[field.name])
         for name in ("latent_dim", "neighbours", "max_iterations", "checkpoint_every"):
             self._at_least(name, 1)
-        for name in ("unlabelled", "seed", "target_noise_floor", "tolerance"):
+        for name in ("seed", "target_noise_floor", "tolerance"):
             self._at_least(name, 0)
-        for name in ("labels", "source_noise_floor"):
+        for name in ("labels", "unlabelled", "source_noise_floor"):
             if getattr(self, name) is not None:
                 self._at_least(name, 0)
         for name in ("sigma_c", "sigma_t"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from facert.data import BoolArray, FloatArray, IntArray, Take
 from facert.errors import InputError
-from facert.gaps import fill_gaps
+from facert.gaps import Gaussian
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -103,8 +103,8 @@ def _choose_labels(labels: IntArray, settings: Settings, rng: np.random.Generato
     return labels if settings.labels is None else _draw(rng, labels, count)
 
 
-def _draw(rng: np.random.Generator, indices: IntArray, count: int) -> IntArray:
-    """So many of the indices at random, all of them when there are fewer; in rising order."""
+def _draw(rng: np.random.Generator, indices: IntArray, count: int | None) -> IntArray:
+    """So many of the indices at random, all when there are fewer or for None; in rising order."""
     chosen = rng.permutation(indices)[:count]
     return np.sort(chosen)
 
@@ -116,9 +116,10 @@ def _filled(X: FloatArray, rows: IntArray, rng: np.random.Generator) -> FloatArr
         return X[rows]
     log.info("filled gaps in %d of %d training frames", int(gaps.sum()), len(rows))
     rest = np.setdiff1d(np.arange(len(X)), rows)
-    support = np.concatenate([rows, _draw(rng, rest, max(FILL_FRAMES - len(rows), 0))])
+    more = _draw(rng, rest, max(FILL_FRAMES - len(rows), 0))
+    support = np.concatenate([_draw(rng, rows, FILL_FRAMES), more])
     # What none of them shows is taken from the first frame that does.
     seen = ~np.isnan(X)
     unseen = ~seen[support].any(axis=0)
     support = np.concatenate([support, np.unique(seen[:, unseen].argmax(axis=0))])
-    return fill_gaps(X[support])[: len(rows)]
+    return Gaussian.of(X[support]).fill(X[rows])

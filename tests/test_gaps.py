@@ -85,3 +85,24 @@ def test_fitted_through_gaps_a_gaussian_keeps_the_variance_that_filling_takes_aw
     plain = np.cov(fill_gaps(gappy).T, bias=True).trace()
     whole, fitted = np.cov(X.T, bias=True).trace(), np.trace(Gaussian.of(gappy).covariance)
     assert abs(fitted - whole) < 0.3 * abs(plain - whole)
+
+
+@pytest.mark.parametrize("chunk", [1, 500, gaps.CHUNK])
+def test_what_a_fill_leaves_open_of_a_linear_function_is_its_conditional_variance(
+    chunk, monkeypatch
+):
+    monkeypatch.setattr(gaps, "CHUNK", chunk)
+    gaussian = Gaussian.of(rows(noise=0.1))
+    X, _ = with_gaps(rows(n=50, noise=0.1, seed=2), 0.4)
+    X[7], X[8] = np.nan, 0.0
+    B = np.random.default_rng(3).normal(size=(9, 4))
+    filled, variance = gaussian.fill_for(X, B)
+
+    np.testing.assert_array_equal(filled, gaussian.fill(X))
+    for h, found in zip(np.isnan(X), variance, strict=True):
+        S = gaussian.covariance
+        gain = np.linalg.solve(S[np.ix_(~h, ~h)], S[np.ix_(~h, h)])
+        left = S[np.ix_(h, h)] - S[np.ix_(h, ~h)] @ gain
+        np.testing.assert_allclose(found, np.diag(B[h].T @ left @ B[h]), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(variance[7], np.diag(B.T @ gaussian.covariance @ B))
+    assert not variance[8].any()

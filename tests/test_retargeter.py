@@ -15,7 +15,8 @@ from facert.metrics import rms
 from facert.normalisation import Normalisation
 from facert.training_set import choose_training_set
 
-QUICK = Settings(unlabelled=30, latent_dim=3, neighbours=5, limits="declared", max_iterations=60)
+QUICK = Settings(unlabelled=30, limits="declared")
+SHARED = replace(QUICK, method="ssgplvm", latent_dim=3, neighbours=5, max_iterations=60)
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +39,26 @@ def retargeter(take):
     return facert.train(take, QUICK)
 
 
-@pytest.fixture
-def model(retargeter, tmp_path):
-    path = tmp_path / "model.safetensors"
+@pytest.fixture(scope="module")
+def shared(take):
+    """A shared Gaussian process model: it goes step by step, in training and online."""
+    return facert.train(take, SHARED)
+
+
+def saved(retargeter, folder):
+    path = folder / "model.safetensors"
     retargeter.save(path)
     return path
+
+
+@pytest.fixture
+def model(retargeter, tmp_path):
+    return saved(retargeter, tmp_path)
+
+
+@pytest.fixture
+def shared_model(shared, tmp_path):
+    return saved(shared, tmp_path)
 
 
 def hide(take, share, seed=0):
@@ -120,25 +136,25 @@ def test_offline_every_frame_is_mapped_on_its_own(retargeter, take):
     np.testing.assert_allclose(few.params, expected.params[order[:5]], atol=1e-7)
 
 
-def test_online_a_frame_depends_on_those_before_and_on_none_after(retargeter, take):
-    whole = retargeter.retarget(take, "online")
-    begun = retargeter.retarget(only(take, np.arange(20)), "online")
+def test_online_a_frame_depends_on_those_before_and_on_none_after(shared, take):
+    whole = shared.retarget(take, "online")
+    begun = shared.retarget(only(take, np.arange(20)), "online")
     np.testing.assert_allclose(begun.params, whole.params[:20], atol=1e-10)
 
 
-def test_without_temporal_pull_online_is_offline(retargeter, model, take):
-    free = facert.load(model)
+def test_without_temporal_pull_online_is_offline(shared, shared_model, take):
+    free = facert.load(shared_model)
     free.method.settings = replace(free.settings, sigma_t=1e6)
     online = free.retarget(take, "online")
-    np.testing.assert_allclose(online.params, retargeter.retarget(take).params, atol=1e-5)
+    np.testing.assert_allclose(online.params, shared.retarget(take).params, atol=1e-5)
 
 
-def test_the_temporal_pull_smooths_a_noisy_source(retargeter, take):
+def test_the_temporal_pull_smooths_a_noisy_source(shared, take):
     noise = 0.2 * np.random.default_rng(0).normal(size=take.source.matrix.shape)
     noisy = replace(take, source=take.source.with_matrix(take.source.matrix + noise))
 
     def jitter(mode):
-        return np.abs(np.diff(retargeter.retarget(noisy, mode).params, 2, axis=0)).mean()
+        return np.abs(np.diff(shared.retarget(noisy, mode).params, 2, axis=0)).mean()
 
     assert jitter("online") < jitter("offline")
 
@@ -198,19 +214,19 @@ def test_limits_clip(take):
 @pytest.mark.parametrize(("rule", "clipped"), [("auto", True), ("declared", False)])
 def test_without_declared_limits_poses_stay_within_those_that_were_seen(take, rule, clipped):
     far = replace(take, source=take.source.with_matrix(1.5 * take.source.matrix))
-    result = facert.train(take, replace(QUICK, limits=rule)).retarget(far)
+    result = facert.train(take, replace(SHARED, limits=rule)).retarget(far)
     seen = np.vstack([take.params[take.labels], take.animation])
     inside = (result.params >= seen.min(axis=0)) & (result.params <= seen.max(axis=0))
     assert inside.all() == clipped
 
 
 def test_the_supervised_model_keeps_the_labelled_frames_alone(take):
-    supervised = facert.train(take, replace(QUICK, method="sgplvm")).method
+    supervised = facert.train(take, replace(SHARED, method="sgplvm")).method
     assert len(supervised.source_.Z) == len(supervised.target_.Z) == 12
 
 
 def test_labels_can_be_drawn_by_seed(take):
-    settings = replace(QUICK, labels=6, seed=3)
+    settings = replace(SHARED, labels=6, seed=3)
     retargeter = facert.train(take, settings)
     drawn = choose_training_set(take, settings).Y_labelled
     np.testing.assert_allclose(
@@ -219,15 +235,19 @@ def test_labels_can_be_drawn_by_seed(take):
     assert retargeter.figures["labelled frames"] == 6
 
 
-def test_how_training_went_is_told(retargeter):
-    figures = retargeter.figures
-    assert figures["labelled frames"] == 12
-    assert figures["unlabelled frames"] == 30
-    assert figures["unlabelled poses"] == 20
+def test_how_training_went_is_told(retargeter, shared):
+    for figures in (retargeter.figures, shared.figures):
+        assert figures["labelled frames"] == 12
+        assert figures["unlabelled frames"] == 30
+        assert figures["unlabelled poses"] == 20
+        assert 0 < figures["training reconstruction"] < 1
+
+
+def test_how_the_steps_of_training_went_is_told(shared):
+    figures = shared.figures
     assert figures["iterations"] > 0
     assert 1 / figures["source theta3"] >= figures["sigma_c"] ** 2
-    assert 1 / figures["target theta3"] >= QUICK.target_noise_floor
-    assert 0 < figures["training reconstruction"] < 1
+    assert 1 / figures["target theta3"] >= SHARED.target_noise_floor
 
 
 @pytest.mark.parametrize(
@@ -297,11 +317,11 @@ def tampered(model, **changes):
         ({"target.scale": -np.ones(1)}, "target.scale"),
         ({"target.scale": np.ones(2)}, "the metadata"),
         ({"target.limits": np.zeros((3, 2))}, "/target/limits"),
-        ({"method.source.latents": None}, "source.latents"),
-        ({"method.source.latents": np.zeros((5, 3))}, "source.latents"),
-        ({"method.target.latents": np.zeros((32, 2))}, "target.latents"),
-        ({"method.target.observations": np.zeros((32, 9))}, "observations: expected 4 columns"),
-        ({"method.source.kernel": np.array([1.0, -1.0, 1.0])}, "source.kernel"),
+        ({"method.source.mean": np.zeros(9)}, "source.covariance: expected 9 for x"),
+        ({"method.source.response": None}, "source.response"),
+        ({"method.map.weights": np.ones(3)}, "map.weights: expected 4 for 4"),
+        ({"method.map.plain.process.X": None}, "map.plain.process.X"),
+        ({"method.map.factors.limits": np.zeros((3, 4))}, "map.factors.limits: expected 2 for 2"),
         ({"source_names": ["a"] * 5}, "names"),
         ({"source_names": None}, "the metadata"),
         ({"source_kind": "smells"}, "source_kind"),
@@ -314,6 +334,22 @@ def test_a_model_file_whose_parts_do_not_fit_is_refused(model, changes, message)
     with pytest.raises(InputError, match=message) as caught:
         facert.load(tampered(model, **changes))
     assert caught.value.where == str(model)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"method.source.latents": None}, "source.latents"),
+        ({"method.source.latents": np.zeros((5, 3))}, "source.latents"),
+        ({"method.target.latents": np.zeros((32, 2))}, "target.latents"),
+        ({"method.target.observations": np.zeros((32, 9))}, "observations: expected 4 columns"),
+        ({"method.source.kernel": np.array([1.0, -1.0, 1.0])}, "source.kernel"),
+    ],
+)
+def test_a_shared_model_whose_parts_do_not_fit_is_refused(shared_model, changes, message):
+    with pytest.raises(InputError, match=message) as caught:
+        facert.load(tampered(shared_model, **changes))
+    assert caught.value.where == str(shared_model)
 
 
 def draw(truth, labels, unlabelled, seed):

@@ -2,6 +2,7 @@ import pytest
 
 from facert.errors import InputError
 from facert.io.toml import read_toml
+from facert.methods import REGISTRY, method_class
 from facert.settings import Settings
 
 
@@ -13,7 +14,8 @@ from facert.settings import Settings
         ("latent_dim", "8", "int"),
         ("latent_dim", True, "int"),
         ("labels", -1, "at least 0"),
-        ("unlabelled", None, "int"),
+        ("unlabelled", -1, "at least 0"),
+        ("unlabelled", 0.5, "int"),
         ("seed", -1, "at least 0"),
         ("sigma_c", 0.0, "above 0"),
         ("sigma_c", float("nan"), "finite"),
@@ -27,6 +29,12 @@ from facert.settings import Settings
 def test_a_value_that_cannot_be_is_named(name, value, expected):
     with pytest.raises(InputError, match=rf"^{name}: expected .*{expected}.*found"):
         Settings(**{name: value})
+
+
+def test_by_default_the_method_decides_how_much_unlabelled_data_it_uses():
+    assert Settings().unlabelled is None
+    most = {name: method_class(name).most_unlabelled for name in REGISTRY}
+    assert {name for name, count in most.items() if count is not None} == {"ssgplvm", "sgplvm"}
 
 
 def test_an_integer_will_do_where_a_number_is_due():

@@ -19,7 +19,7 @@ class ProgressBar(Monitor):
         shown = console.err.is_terminal and console.log.isEnabledFor(logging.INFO)
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
         self._progress = Progress(*columns, console=console.err, transient=True, disable=not shown)
-        self._task = self._progress.add_task("aligning both views")
+        self._task = self._progress.add_task("training")
 
     def __enter__(self) -> ProgressBar:
         self._progress.start()

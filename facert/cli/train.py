@@ -20,14 +20,13 @@ if TYPE_CHECKING:
 
 DEFAULT_MODEL = Path("model.safetensors")
 DEFAULTS = Settings()
+SMALL = 0.01  # of numbers below it digits are shown, not decimals
 
 
-def _setting(name: str, text: str) -> Any:
+def _setting(name: str, text: str, unset: str = "from the data") -> Any:
     """An option that is None unless given, so that it can come before the config file."""
     default = getattr(DEFAULTS, name)
-    return typer.Option(
-        help=text, show_default="from the data" if default is None else str(default)
-    )
+    return typer.Option(help=text, show_default=unset if default is None else str(default))
 
 
 def command(
@@ -40,15 +39,21 @@ def command(
     ] = DEFAULT_MODEL,
     method: Annotated[str | None, _setting("method", "One of " + ", ".join(REGISTRY) + ".")] = None,
     labels: Annotated[
-        int | None,
-        typer.Option(help="Use only so many of the posed frames, at random.", show_default="all"),
+        int | None, _setting("labels", "Use only so many of the posed frames, at random.", "all")
     ] = None,
     unlabelled: Annotated[
-        int | None, _setting("unlabelled", "Frames without a pose, and poses without a frame.")
+        int | None,
+        _setting(
+            "unlabelled",
+            "Frames without a pose, and poses without a frame.",
+            "100 for the shared models, else all",
+        ),
     ] = None,
-    latent_dim: Annotated[int | None, _setting("latent_dim", "Latent dimensions.")] = None,
+    latent_dim: Annotated[
+        int | None, _setting("latent_dim", "Latent dimensions of the shared models.")
+    ] = None,
     neighbours: Annotated[
-        int | None, _setting("neighbours", "Neighbours in the local linear prior.")
+        int | None, _setting("neighbours", "Neighbours in the prior of the shared models.")
     ] = None,
     sigma_c: Annotated[
         float | None,
@@ -58,18 +63,23 @@ def command(
         str | None,
         _setting("limits", "Clip poses to: auto (declared, else seen), declared, or none."),
     ] = None,
-    optimizer: Annotated[str | None, _setting("optimizer", "lbfgs, or scg (the paper's).")] = None,
+    optimizer: Annotated[
+        str | None, _setting("optimizer", "Of the shared models: lbfgs, or scg (the paper's).")
+    ] = None,
     seed: Annotated[int | None, _setting("seed", "For every random choice.")] = None,
-    device: Annotated[str | None, _setting("device", "cpu or cuda.")] = None,
+    device: Annotated[
+        str | None, _setting("device", "cpu or, for the shared models, cuda.")
+    ] = None,
     config: Annotated[
         Path | None,
         typer.Option(help="TOML file with any of the settings; options given here come first."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue from the checkpoint beside the output.")
+        bool, typer.Option("--resume", help="Continue a shared model from its checkpoint.")
     ] = False,
     curve: Annotated[
-        Path | None, typer.Option("--log", help="CSV file for the training curve.")
+        Path | None,
+        typer.Option("--log", help="CSV file for the training curve of a shared model."),
     ] = None,
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several.")
@@ -96,6 +106,36 @@ def command(
     import facert
     from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
     from facert.cli.progress import ProgressBar
+    from facert.methods import method_class
+
+    settings = _settings(config, options)
+    stepwise = method_class(settings.method).stepwise
+    if not stepwise:
+        _warn_of_idle_options(settings.method, resume, curve)
+    checkpoint = CheckpointFile(checkpoint_path(output), resume) if stepwise else None
+    # An interrupted run leaves a model, and a checkpoint to continue from.
+    continues = checkpoint is not None and checkpoint.continues
+    overwrite_model = overwrite or continues
+    if output.exists() and not overwrite_model:
+        raise OutputExistsError(output)
+    data = _read(take, target)
+    monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
+    if curve is not None and stepwise:
+        monitors.append(CurveLog(curve, overwrite, continues))
+    with reading(take or "the built-in take"), ProgressBar() as bar:
+        retargeter = facert.train(data, settings, Monitors(*monitors, bar))
+    retargeter.save(output, overwrite_model)
+    status = retargeter.figures.get("status")
+    if checkpoint is not None and status in ("converged", "stalled"):
+        checkpoint.remove()
+    _print_table(retargeter, output)
+    if status == "interrupted":
+        console.log.warning("stopped; --resume continues")
+        raise typer.Exit(130)
+
+
+def _settings(config: Path | None, options: dict[str, Any]) -> Settings:
+    """Of the config file, then of the options that were given."""
     from facert.io.toml import read_toml
 
     settings = DEFAULTS
@@ -103,26 +143,15 @@ def command(
         with reading(config):
             settings = settings.with_changes(read_toml(config))
     with reading("the options"):
-        settings = settings.with_changes({k: v for k, v in options.items() if v is not None})
+        return settings.with_changes({k: v for k, v in options.items() if v is not None})
 
-    checkpoint = CheckpointFile(checkpoint_path(output), resume)
-    # An interrupted run leaves a model, and a checkpoint to continue from.
-    overwrite_model = overwrite or checkpoint.continues
-    if output.exists() and not overwrite_model:
-        raise OutputExistsError(output)
-    data = _read(take, target)
-    monitors: list[Monitor] = [checkpoint]
-    if curve is not None:
-        monitors.append(CurveLog(curve, overwrite, checkpoint.continues))
-    with reading(take or "the built-in take"), ProgressBar() as bar:
-        retargeter = facert.train(data, settings, Monitors(*monitors, bar))
-    retargeter.save(output, overwrite_model)
-    if retargeter.figures.get("status", "converged") in ("converged", "stalled"):
-        checkpoint.remove()
-    _print_table(retargeter, output)
-    if retargeter.figures.get("status") == "interrupted":
-        console.log.warning("stopped; --resume continues")
-        raise typer.Exit(130)
+
+def _warn_of_idle_options(method: str, resume: bool, curve: Path | None) -> None:
+    """Say which options do nothing with a method that does not train step by step."""
+    idle = [name for name, given in (("--resume", resume), ("--log", curve)) if given]
+    if idle:
+        options = " and ".join(idle)
+        console.log.warning("%s learns in one go: nothing to do for %s", method, options)
 
 
 def _require_output(output: Path, curve: Path | None) -> None:
@@ -159,8 +188,14 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
     title = Text(f"{retargeter.settings.method} in {output}")
     table = Table(title=title, show_header=False)
     for name, value in figures.items():
-        shown = f"{value:.6g}" if isinstance(value, float) else str(value)
-        if isinstance(value, float) and not math.isfinite(value):
-            shown = "-"
-        table.add_row(name, shown)
+        table.add_row(name, _shown(value) if isinstance(value, float) else str(value))
     console.out.print(table)
+
+
+def _shown(value: float) -> str:
+    """Three decimals, or three digits where decimals would show little of a number."""
+    if not math.isfinite(value):
+        return "-"
+    if value and abs(value) < SMALL:
+        return f"{value:.3g}"
+    return f"{value:.3f}".rstrip("0").rstrip(".")

@@ -15,17 +15,17 @@ from facert.settings import Settings
 if TYPE_CHECKING:
     from facert.methods.base import Method
 
-__all__ = ["REGISTRY", "make_method"]
+__all__ = ["REGISTRY", "make_method", "method_class"]
 
 # Name: module and class. A module is loaded with its first method: the libraries behind them take
 # their time, and the names alone are wanted for help.
 REGISTRY = {
+    "auto": ("blend", "Auto"),
+    "ssgpr": ("ssgpr", "SemiSupervisedGPR"),
     "ssgplvm": ("shared_gplvm", "SemiSupervisedSGPLVM"),
     "sgplvm": ("shared_gplvm", "SupervisedSGPLVM"),
     "gpr": ("gpr", "GPR"),
     "gpr-linear": ("gpr", "LinearGPR"),
-    "auto": ("blend", "Auto"),
-    "ssgpr": ("blend", "SemiSupervisedGPR"),
     "svr": ("svr", "SVR"),
     "ridge": ("linear", "Ridge"),
     "pls": ("linear", "PLS"),
@@ -34,18 +34,23 @@ REGISTRY = {
 }
 
 
-def make_method(settings: Settings) -> Method:
-    """A method by the name in the settings.
+def method_class(name: str) -> type[Method]:
+    """The class of a method.
 
     Raises
     ------
     InputError
         When there is none of that name.
     """
-    if settings.method not in REGISTRY:
+    if name not in REGISTRY:
         raise InputError(
-            "method", "one of " + ", ".join(REGISTRY), repr(settings.method), "Choose one of these."
+            "method", "one of " + ", ".join(REGISTRY), repr(name), "Choose one of these."
         )
-    module, name = REGISTRY[settings.method]
-    method: Method = getattr(importlib.import_module(f"facert.methods.{module}"), name)(settings)
-    return method
+    module, class_name = REGISTRY[name]
+    found: type[Method] = getattr(importlib.import_module(f"facert.methods.{module}"), class_name)
+    return found
+
+
+def make_method(settings: Settings) -> Method:
+    """A method by the name in the settings; raises InputError when there is none of that name."""
+    return method_class(settings.method)(settings)

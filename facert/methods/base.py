@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -28,10 +28,15 @@ class Labelled:
 
 @dataclass(frozen=True)
 class Unlabelled:
-    """Frames without a pose, X (m, d_x), and poses without a frame, Y (n, d_y), complete."""
+    """Frames without a pose, X (m, d_x), and poses without a frame, Y (n, d_y), complete.
+
+    What is said of a frame is clipped to `bounds`, (2, d_y), infinite where nothing is; by default
+    to the range of all poses. A method may use that.
+    """
 
     X: FloatArray
     Y: FloatArray
+    bounds: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,13 @@ class Method(Protocol):
     """A way to learn the map from source to target; after `fit`, its settings are complete."""
 
     settings: Settings
+    most_unlabelled: ClassVar[int | None]
+    """Frames and poses that it has use for, of each; None: all."""
+    stepwise: ClassVar[bool]
+    """Whether it trains step by step, on the device of the settings, and can be watched, stopped
+    and resumed; another learns in one go, on the CPU."""
+
+    def __init__(self, settings: Settings) -> None: ...
 
     @property
     def dimensions(self) -> tuple[int, int]:

@@ -1,185 +1,177 @@
-"""Semi-supervised regression: experts on features of every frame, shrunk by every pose.
+"""`auto`: the default, a blend of experts weighted by how well each foretells the labels.
 
-`ssgpr` has one expert, a Gaussian process with a linear term on half-whitened features. No one
-recipe suits all captures, though: clean ones with many small directions want whitened features,
-real markers the source as it is, and where the rig follows the markers linearly a ridge is hard to
-beat. `auto` has both, on the source's own proportions and on features whitened by a quarter and by
-half. All leave-one-out predictions are known in closed form. With P_e (l, d_y) those of expert e,
-clipped to the range of all known poses, the weights minimise
+No one method suits all captures. Where the rig follows the markers linearly, factors that all
+frames and poses share are hard to beat (`facert.factors`); where skin and rig do not, a
+Gaussian process on the markers as they are is. `auto` has four experts:
+
+1. a Gaussian process with a linear term, on the source as it is;
+2. the same on half-whitened features;
+3. the factors, shrunk towards likely poses;
+4. the factors and what a Gaussian process on half-whitened features tells of their errors at
+   labels that they had not seen, shrunk likewise.
+
+With P_e (l, d_y) what expert e says of labels left out, clipped to the limits of the poses, the
+weights minimise
 
     |Σ_e w_e P_e - Y|² + ρ E |w|²,      w_e >= 0,      Σ_e w_e = 1,
 
 E the least squared error of one expert: few labels say little about which expert is best, and ρ
-then keeps the weights together (Breiman 1996, Stacked Regressions). The blend is shrunk towards
-likely poses, see `facert.methods.shrinkage`.
+then keeps the weights together (Breiman 1996, Stacked Regressions).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import nnls
 
 from facert.data import FloatArray
-from facert.gp.regression import maximise_likelihood
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.features import whitening
-from facert.methods.gpr import ProcessMap
-from facert.methods.linear import leave_one_out_ridge
-from facert.methods.regression import Map, Regression
-from facert.methods.shrinkage import shrinkage
+from facert.methods.factors import FactorMap, Trio, left_out_poses
+from facert.methods.regression import Arrays, Map, Regression
+from facert.methods.shrinkage import Shrinkage
+from facert.methods.ssgpr import Basis, FeatureProcess
+from facert.metrics import rms
 
-TOGETHER = 0.1  # ρ
+TOGETHER = 0.3  # ρ
+FAULTLESS = 1e-9  # least E, relative to the squared error of the worst expert
+EXPERTS = (
+    "Gaussian process on the source",
+    "Gaussian process on features",
+    "factors",
+    "factors and Gaussian process",
+)
+# Poses without a frame that the factors are learned from: the time that it takes grows with them.
+MOST_POSES = 500
+UNBOUNDED = 1e9  # in normalised units: no limit, in a file of finite numbers
 
 
 @dataclass(frozen=True, eq=False)
 class BlendMap(Map):
-    """A weighted sum of Gaussian processes and a linear map, shrunk towards likely poses.
+    """The experts and their weights.
 
     Parameters
     ----------
-    X, Y : arrays, shapes (n, d_x) and (n, d_y)
-        Labelled frames and poses.
-    centre : array, shape (d_x,)
-        Mean of all frames.
-    bases : array, shape (p, d_x, d_x)
-        Of the features of each process, see `facert.methods.features.whitening`.
-    thetas : array, shape (p, 4)
-        Of each process, see `facert.methods.gpr.ProcessMap`.
-    weights : array, shape (p,)
-        Of each process.
-    linear : array, shape (d_x, d_y)
-        All ridges, times their weights.
-    mean : array, shape (d_y,)
-        Mean of all poses.
-    shrink : array, shape (d_y, d_y)
-        See `facert.methods.shrinkage.shrinkage`.
+    weights : array, shape (4,)
+    range : array, shape (2, d_y)
+        What every expert is clipped to.
+    doubt : array, shape (d_y,)
+        How far off the shrunk factors were at labels left out, root mean square. Their own spread
+        is that of free poses, and knows nothing of how well the labels fix them.
+    plain, whitened : FeatureProcess
+    factors : FactorMap
+    residual : FeatureProcess
+        What the factors miss.
+    shrinkage, residual_shrinkage : Shrinkage
+        Of the factors without and with that.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {
-        "X": "nx",
-        "Y": "ny",
-        "centre": "x",
-        "bases": "pxx",
-        "thetas": "p4",
-        "weights": "p",
-        "linear": "xy",
-        "mean": "y",
-        "shrink": "yy",
+    axes: ClassVar[Mapping[str, str]] = {"weights": "4", "range": "2y", "doubt": "y"}
+    parts: ClassVar[Mapping[str, type[Arrays]]] = {
+        "plain": FeatureProcess,
+        "whitened": FeatureProcess,
+        "factors": FactorMap,
+        "residual": FeatureProcess,
+        "shrinkage": Shrinkage,
+        "residual_shrinkage": Shrinkage,
     }
 
-    X: FloatArray
-    Y: FloatArray
-    centre: FloatArray
-    bases: FloatArray
-    thetas: FloatArray
     weights: FloatArray
-    linear: FloatArray
-    mean: FloatArray
-    shrink: FloatArray
+    range: FloatArray
+    doubt: FloatArray
+    plain: FeatureProcess
+    whitened: FeatureProcess
+    factors: FactorMap
+    residual: FeatureProcess
+    shrinkage: Shrinkage
+    residual_shrinkage: Shrinkage
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Poses of frames X (T, d_x), (T, d_y); the std is the processes', weighted alike."""
-        offsets = X - self.centre
-        poses, variance = offsets @ self.linear, np.zeros((len(X), len(self.mean)))
-        share = self.weights / max(float(self.weights.sum()), np.finfo(np.float64).tiny)
-        for process, basis, weight, part in zip(
-            self.processes, self.bases, self.weights, share, strict=True
-        ):
-            pose, std = process(offsets @ basis)
-            poses += weight * pose
-            variance += part * std**2
-        return self.mean + poses @ self.shrink, np.sqrt(variance)
-
-    @cached_property
-    def processes(self) -> list[ProcessMap]:
-        """From each kind of features to poses less their mean."""
-        return [
-            ProcessMap((self.X - self.centre) @ basis, self.Y - self.mean, theta)
-            for basis, theta in zip(self.bases, self.thetas, strict=True)
+        """Poses of frames X (T, d_x), (T, d_y); the variance is the experts', weighted alike."""
+        plain, whitened, factors, missed = (
+            part(X) for part in (self.plain, self.whitened, self.factors, self.residual)
+        )
+        said = self._clip(factors[0])
+        poses = [
+            plain[0],
+            whitened[0],
+            self.shrinkage(said),
+            self.residual_shrinkage(self._clip(said + missed[0])),
         ]
+        doubt = np.broadcast_to(self.doubt, said.shape)
+        variances = [std**2 for std in (plain[1], whitened[1], doubt, missed[1])]
+        pose = np.tensordot(self.weights, np.array([self._clip(p) for p in poses]), axes=1)
+        return pose, np.sqrt(np.tensordot(self.weights, np.array(variances), axes=1))
+
+    def _clip(self, poses: FloatArray) -> FloatArray:
+        return np.clip(poses, *self.range)
 
 
-class Blend(Regression):
-    """Experts on whitened features, weighted by how well each foretells the labels."""
+class Auto(Regression):
+    """Processes and factors, blended."""
 
     map_type = BlendMap
-    process_powers: ClassVar[tuple[float, ...]]
-    """p of the features of each Gaussian process, see `facert.methods.features`."""
-    ridge_powers: ClassVar[tuple[float, ...]]
-    """The same of each ridge."""
 
     def _learn(
         self, labelled: Labelled, unlabelled: Unlabelled
     ) -> tuple[BlendMap, dict[str, float]]:
-        frames = np.vstack([labelled.X, unlabelled.X])
-        poses = np.vstack([labelled.Y, unlabelled.Y])
-        centre, mean = frames.mean(axis=0), poses.mean(axis=0)
-        offsets, targets = labelled.X - centre, labelled.Y - mean
-        bases = {p: _basis(frames, p) for p in {*self.process_powers, *self.ridge_powers}}
+        poses, Y = np.vstack([labelled.Y, unlabelled.Y]), labelled.Y
+        bounds = _bounds(unlabelled, poses)
+        some = _fewer_poses(unlabelled, self.settings.seed)
+        trio = Trio.learn(labelled, some)
+        plain, whitened, factors = np.clip(left_out_poses(labelled, some), *bounds)
 
-        processes = [_process(offsets @ bases[p], targets) for p in self.process_powers]
-        ridges = [leave_one_out_ridge(offsets @ bases[p], targets) for p in self.ridge_powers]
-        errors = [process.left_out_errors for process in processes]
-        errors += [ridge.left_out_errors for ridge in ridges]
-        limits = poses.min(axis=0) - mean, poses.max(axis=0) - mean
-        weights = blend_weights([targets - np.clip(targets - e, *limits) for e in errors])
-
-        linear = np.zeros((len(centre), len(mean)))
-        for p, weight, ridge in zip(
-            self.ridge_powers, weights[len(processes) :], ridges, strict=True
-        ):
-            linear += weight * (bases[p] @ ridge.weights)
+        basis = Basis(trio.whitened.centre, trio.whitened.basis)
+        missed = Labelled(labelled.X, Y - factors)
+        residual = FeatureProcess.learn(missed, basis, np.zeros(Y.shape[1]))
+        corrected = np.clip(Y - residual.process.left_out_errors, *bounds)
+        shrinkage = Shrinkage.learn(poses, Y - factors)
+        residual_shrinkage = Shrinkage.learn(poses, Y - corrected)
+        said = [plain, whitened, shrinkage(factors), residual_shrinkage(corrected)]
+        errors = [Y - np.clip(p, *bounds) for p in said]
+        weights = blend_weights(errors)
         made = BlendMap(
-            X=labelled.X,
-            Y=labelled.Y,
-            centre=centre,
-            bases=np.array([bases[p] for p in self.process_powers]),
-            thetas=np.array([process.theta for process in processes]),
-            weights=weights[: len(processes)],
-            linear=linear,
-            mean=mean,
-            shrink=shrinkage(poses, np.tensordot(weights, np.array(errors), axes=1)),
+            weights=weights,
+            range=bounds,
+            doubt=np.sqrt(np.mean(errors[EXPERTS.index("factors")] ** 2, axis=0)),
+            plain=trio.plain,
+            whitened=trio.whitened,
+            factors=trio.factors,
+            residual=residual,
+            shrinkage=shrinkage,
+            residual_shrinkage=residual_shrinkage,
         )
-        names = [f"gpr-linear, whitened {p:g}" for p in self.process_powers]
-        names += [f"ridge, whitened {p:g}" for p in self.ridge_powers]
-        shares = {f"weight of {n}": float(w) for n, w in zip(names, weights, strict=True)}
         counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
-        return made, {**counts, **shares}
+        shares = {f"weight of {n}": float(w) for n, w in zip(EXPERTS, weights, strict=True)}
+        missed_by_all = rms(np.tensordot(weights, np.array(errors), axes=1))
+        return made, {**counts, **shares, "error at poses left out": missed_by_all}
 
 
-class SemiSupervisedGPR(Blend):
-    """One Gaussian process, on half-whitened features."""
-
-    process_powers = (0.5,)
-    ridge_powers = ()
-
-
-class Auto(Blend):
-    """Gaussian processes and ridges, on three kinds of features."""
-
-    process_powers = ridge_powers = (0.0, 0.25, 0.5)
+def _bounds(unlabelled: Unlabelled, poses: FloatArray) -> FloatArray:
+    """What poses are clipped to, (2, d_y), finite."""
+    if unlabelled.bounds is None:
+        return np.stack([poses.min(axis=0), poses.max(axis=0)])
+    return np.clip(unlabelled.bounds, -UNBOUNDED, UNBOUNDED)
 
 
-def _basis(frames: FloatArray, power: float) -> FloatArray:
-    """Of the features; without whitening the source as it is, noise and all."""
-    return whitening(frames, power) if power else np.eye(frames.shape[1])
-
-
-def _process(features: FloatArray, targets: FloatArray) -> ProcessMap:
-    kernel = maximise_likelihood(features, targets).kernel
-    return ProcessMap(features, targets, np.array([*kernel.theta, kernel.linear]))
+def _fewer_poses(unlabelled: Unlabelled, seed: int) -> Unlabelled:
+    """At most `MOST_POSES` of the poses, drawn at random."""
+    if len(unlabelled.Y) <= MOST_POSES:
+        return unlabelled
+    rows = np.random.default_rng(seed).permutation(len(unlabelled.Y))[:MOST_POSES]
+    return replace(unlabelled, Y=unlabelled.Y[np.sort(rows)])
 
 
 def blend_weights(errors: Sequence[FloatArray]) -> FloatArray:
     """The weights of experts, (e,), from what each missed every label by, (l, d_y) each."""
     flat = np.stack([error.ravel() for error in errors])
     gram = flat @ flat.T
-    least = max(float(gram.diagonal().min()), np.finfo(np.float64).tiny)
+    squares = gram.diagonal()
+    # An expert may miss nothing: clipped, or where nothing moves.
+    least = max(squares.min(), FAULTLESS * squares.max(), np.finfo(np.float64).tiny)
     Q = gram / least + TOGETHER * np.eye(len(flat))
     # The quadratic form is homogeneous: without the sum, min v'Qv/2 - 1'v over v >= 0 has the same
     # direction, and is a non-negative least squares problem.

@@ -18,6 +18,7 @@ import numpy as np
 
 from facert.data import FloatArray
 
+LEAST_DIRECTIONS = 12  # to tell noise from motion by
 EPSILON = 1e-5  # ε: directions smaller than this fade out, whatever the noise
 
 
@@ -25,9 +26,9 @@ def noise_variance(variances: FloatArray) -> float:
     """σ² of one direction: the median of all principal variances.
 
     A face moves in far fewer directions than it has coordinates, so that half of them show noise
-    alone; without noise the median is zero.
+    alone; without noise the median is zero. A few weights have no direction to spare.
     """
-    return float(np.median(variances))
+    return float(np.median(variances)) if len(variances) >= LEAST_DIRECTIONS else 0.0
 
 
 def whitening(X: FloatArray, power: float) -> FloatArray:

@@ -1,11 +1,11 @@
-"""Cross-validation over the labels, in blocks of time."""
+"""Cross-validation over the labels."""
 
 from __future__ import annotations
 
 import numpy as np
 from sklearn.model_selection import KFold
 
-from facert.data import IntArray
+from facert.data import FloatArray, IntArray
 
 FOLDS = 5
 
@@ -17,3 +17,17 @@ def blocked_folds(count: int) -> list[tuple[IntArray, IntArray]]:
     run of them away, so that a method cannot score by remembering the frame next door.
     """
     return list(KFold(min(FOLDS, count)).split(np.empty(count)))
+
+
+def ranked_folds(X: FloatArray) -> list[tuple[IntArray, IntArray]]:
+    """Training and test rows of each fold, whatever the order of the frames X (l, d_x).
+
+    Ranked by their distance from the mean, frames go to the folds in turn: each fold holds calm
+    and extreme ones, and none has all the extremes to foretell from calm ones.
+    """
+    ranks = np.argsort(np.sum((X - X.mean(axis=0)) ** 2, axis=1), kind="stable")
+    folds = min(FOLDS, len(X))
+    return [
+        (np.sort(np.delete(ranks, slice(fold, None, folds))), np.sort(ranks[fold::folds]))
+        for fold in range(folds)
+    ]

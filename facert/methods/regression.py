@@ -6,10 +6,11 @@ Around it, `Regression` fills the gaps of the source, saves and loads, and strea
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -17,20 +18,24 @@ from facert.data import FloatArray
 from facert.errors import InputError
 from facert.gaps import Gaussian
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
+from facert.methods.device import find_device
 from facert.metrics import rms
 from facert.optim.monitor import Monitor
 from facert.settings import Settings
 from facert.threads import threads_for
 
+log = logging.getLogger(__name__)
+
 DAMAGED = "The model file is damaged: train it again."
 
 
 @dataclass(frozen=True, eq=False)
-class Map(ABC):
-    """A trained map from complete frames to poses; every field is an array.
+class Arrays:
+    """Arrays that were learned together; a field may be a group of such arrays itself.
 
-    `axes` spells the shape of each field, a letter an axis. A letter stands for one size in all of
+    `axes` spells the shape of each array, a letter an axis. A letter stands for one size in all of
     them ("x" for d_x, "y" for d_y), a digit for itself: ``{"weights": "xy", "offset": "y"}``.
+    `parts` tells the type of each field that is a group.
 
     Raises
     ------
@@ -39,14 +44,44 @@ class Map(ABC):
     """
 
     axes: ClassVar[Mapping[str, str]]
+    parts: ClassVar[Mapping[str, type[Arrays]]] = {}
 
     def __post_init__(self) -> None:
-        check_axes(self.arrays, self.axes)
+        check_axes(self.arrays, self.all_axes())
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """The fields by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        """Every array by its name, those of a part as ``part.name``."""
+        own = {name: getattr(self, name) for name in self.axes}
+        return own | {
+            f"{part}.{name}": array
+            for part in self.parts
+            for name, array in getattr(self, part).arrays.items()
+        }
+
+    @classmethod
+    def all_axes(cls) -> dict[str, str]:
+        """The shape of every array."""
+        return dict(cls.axes) | {
+            f"{part}.{name}": letters
+            for part, group in cls.parts.items()
+            for name, letters in group.all_axes().items()
+        }
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, FloatArray], prefix: str = "") -> Self:
+        """Put together again what `arrays` told."""
+        own = {name: arrays[prefix + name] for name in cls.axes}
+        groups = {name: part.of(arrays, f"{prefix}{name}.") for name, part in cls.parts.items()}
+        return cls(**own, **groups)
+
+
+@dataclass(frozen=True, eq=False)
+class Map(Arrays, ABC):
+    """A trained map from complete frames to poses."""
+
+    tells_std: ClassVar[bool] = True
+    """Whether poses come with their standard deviation."""
 
     @abstractmethod
     def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray | None]:
@@ -57,18 +92,25 @@ class Regression(ABC):
     """A method that learns a `Map`.
 
     What a frame does not show is filled in first, by what all training frames tell of how the
-    source's dimensions go together; the cleaned source of a prediction is the filled one.
+    source's dimensions go together; the cleaned source of a prediction is the filled one. What the
+    fill leaves open adds to the variance of a pose, as it would with the best linear stand-in for
+    the map, y = const + x B: see `facert.gaps.Gaussian.fill_for`.
 
     Parameters
     ----------
     settings : Settings
-        Only the name of the method is used.
+        Of these the name of the method, the seed and the device are used.
     """
 
     map_type: ClassVar[type[Map]]
     least_labels: ClassVar[int] = 3
+    most_unlabelled: ClassVar[int | None] = None
+    stepwise: ClassVar[bool] = False
 
+    gaps_: Gaussian
     map_: Map
+    response_: FloatArray
+    """B, (d_x, d_y); (d_x, 0) where the map tells no standard deviation."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -76,7 +118,7 @@ class Regression(ABC):
     @property
     def dimensions(self) -> tuple[int, int]:
         """d_x and d_y of what it was trained on."""
-        sizes = check_axes(self.map_.arrays, self.map_.axes)
+        sizes = check_axes(self.map_.arrays, self.map_.all_axes())
         return sizes["x"], sizes["y"]
 
     def fit(
@@ -98,7 +140,10 @@ class Regression(ABC):
         ------
         InputError
             With fewer than `least_labels` labelled frames.
+        DeviceError
+            When the settings ask for a device that is not there.
         """
+        self._stay_on_cpu()
         count = len(labelled.X)
         if count < self.least_labels:
             raise InputError(
@@ -108,8 +153,10 @@ class Regression(ABC):
                 "Pose more frames (10 to 40 serve well).",
             )
         with threads_for(count):
-            self.gaps_ = Gaussian.of(np.vstack([labelled.X, unlabelled.X]))
+            frames = np.vstack([labelled.X, unlabelled.X])
+            self.gaps_ = Gaussian.of(frames)
             self.map_, figures = self._learn(labelled, unlabelled)
+            self.response_ = self._linear_response(frames)
             residual = rms(self.map_(labelled.X)[0] - labelled.Y)
         return Report(figures={**figures, "training reconstruction": residual})
 
@@ -117,19 +164,34 @@ class Regression(ABC):
     def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, dict[str, float]]:
         """The map, and what to report of it."""
 
+    def _stay_on_cpu(self) -> None:
+        device = self.settings.device
+        if find_device(device).type != "cpu":
+            log.warning("%s trains on the CPU: %s is not used", self.settings.method, device)
+
+    def _linear_response(self, frames: FloatArray) -> FloatArray:
+        """B, least squares of the map's poses on frames (n, d_x); the ridge is the Gaussian's."""
+        if not self.map_.tells_std:
+            return np.empty((frames.shape[1], 0))
+        poses, _ = self.map_(frames)
+        products = (frames - self.gaps_.mean).T @ (poses - poses.mean(axis=0)) / len(frames)
+        return np.linalg.solve(self.gaps_.covariance, products).astype(np.float64)
+
     def predict(self, frames: FloatArray) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed."""
-        X = self.gaps_.fill(frames)
+        X, doubt = self.gaps_.fill_for(frames, self.response_)
         Y, std = self.map_(X)
-        return Prediction(Y, std, X)
+        return Prediction(Y, None if std is None else np.sqrt(std**2 + doubt), X)
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other; none remembers those before."""
         return _MemorylessStream(self)
 
     def save(self) -> dict[str, FloatArray]:
-        """The arrays of the map, and mean and covariance of the source."""
+        """The arrays of the map, mean and covariance of the source, and B if there is one."""
         arrays = {f"map.{name}": array for name, array in self.map_.arrays.items()}
+        if self.map_.tells_std:
+            arrays["source.response"] = self.response_
         return {
             "source.mean": self.gaps_.mean,
             "source.covariance": self.gaps_.covariance,
@@ -144,8 +206,10 @@ class Regression(ABC):
         InputError
             When an array is absent or the shapes do not fit together.
         """
-        parts = {f"map.{name}": axes for name, axes in self.map_type.axes.items()}
-        check_axes(arrays, {"source.mean": "x", "source.covariance": "xx", **parts})
+        of_map = {f"map.{name}": axes for name, axes in self.map_type.all_axes().items()}
+        if self.map_type.tells_std:
+            of_map["source.response"] = "xy"
+        check_axes(arrays, {"source.mean": "x", "source.covariance": "xx", **of_map})
         try:
             np.linalg.cholesky(arrays["source.covariance"])
         except np.linalg.LinAlgError:
@@ -153,7 +217,9 @@ class Regression(ABC):
                 "source.covariance", "a positive definite matrix", "another", DAMAGED
             ) from None
         self.gaps_ = Gaussian(arrays["source.mean"], arrays["source.covariance"])
-        self.map_ = self.map_type(**{name: arrays[f"map.{name}"] for name in self.map_type.axes})
+        self.map_ = self.map_type.of(arrays, "map.")
+        none = np.empty((len(self.gaps_.mean), 0))
+        self.response_ = arrays["source.response"] if self.map_type.tells_std else none
 
 
 class SupervisedRegression(Regression):

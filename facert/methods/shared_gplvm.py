@@ -6,13 +6,13 @@ import hashlib
 import logging
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
-import torch
 from scipy.sparse import csr_array
 
 from facert.data import FloatArray
-from facert.errors import DeviceError, InputError
+from facert.errors import InputError
 from facert.gp.kernel import Kernel
 from facert.gp.posterior import Posterior
 from facert.gplvm.alignment import align, principal_components
@@ -23,6 +23,7 @@ from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
 from facert.gplvm.target_mapping import map_to_target
 from facert.gplvm.training import train
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
+from facert.methods.device import find_device
 from facert.optim.base import Optimiser
 from facert.optim.lbfgs import LBFGS
 from facert.optim.monitor import Monitor
@@ -44,6 +45,9 @@ class SemiSupervisedSGPLVM:
         Latent dimension, neighbours, noise, optimiser, device. `fit` fills in the noise of the
         source where it is left open.
     """
+
+    most_unlabelled: ClassVar[int | None] = 100  # more have not been seen to help
+    stepwise: ClassVar[bool] = True
 
     def __init__(self, settings: Settings) -> None:
         self.settings = self._given = settings
@@ -71,7 +75,7 @@ class SemiSupervisedSGPLVM:
         with threads_for(len(X) + len(Y) - count):
             module = self._initial_module(X, Y, count)
             result = train(
-                module.to(_device(self.settings.device)),
+                module.to(find_device(self.settings.device)),
                 self._optimiser(),
                 tolerance=self.settings.tolerance,
                 max_iterations=self.settings.max_iterations,
@@ -226,25 +230,6 @@ def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
     )
     digest.update(repr(shaping).encode())
     return digest.hexdigest()
-
-
-def _device(name: str) -> torch.device:
-    """The device of that name.
-
-    Raises
-    ------
-    DeviceError
-        When it is not there: training never falls back to another device in silence.
-    """
-    try:
-        device = torch.device(name)
-        if device.type not in ("cpu", "cuda"):
-            raise RuntimeError("only cpu and cuda are known to work")
-        torch.empty(0, device=device)
-    except (RuntimeError, AssertionError, NotImplementedError) as error:
-        reason = str(error).splitlines()[0]
-        raise DeviceError(f"--device {name}: {reason}. Use --device cpu.") from None
-    return device
 
 
 def _view(arrays: Mapping[str, FloatArray], name: str) -> Posterior:

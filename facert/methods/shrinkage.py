@@ -14,28 +14,45 @@ a Gaussian process are known in closed form, (K⁻¹Y)_i / (K⁻¹)_ii (Rasmusse
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
 from facert.data import FloatArray
+from facert.methods.regression import Arrays
 
 # Added to the covariance of all poses, relative to its mean variance: few poses leave it singular.
 RIDGE = 1e-6
 
 
-def shrinkage(poses: FloatArray, errors: FloatArray) -> FloatArray:
-    """(C + R)⁻¹ C, to be applied to rows of predictions less the mean pose.
+@dataclass(frozen=True, eq=False)
+class Shrinkage(Arrays):
+    """What takes a predicted pose to a likely one.
 
     Parameters
     ----------
-    poses : array, shape (n, d_y)
-        All poses that are known.
-    errors : array, shape (l, d_y)
-        What the regression missed each label by when that label was left out.
-
-    Returns
-    -------
-    array, shape (d_y, d_y)
+    mean : array, shape (d_y,)
+        ȳ.
+    matrix : array, shape (d_y, d_y)
+        (C + R)⁻¹ C, to be applied to rows.
     """
-    C = np.atleast_2d(np.cov(poses, rowvar=False, bias=True))
-    R = np.diag(np.mean(errors**2, axis=0) + RIDGE * np.trace(C) / len(C))
-    return np.linalg.solve(C + R, C).astype(np.float64)
+
+    axes: ClassVar[Mapping[str, str]] = {"mean": "y", "matrix": "yy"}
+
+    mean: FloatArray
+    matrix: FloatArray
+
+    @classmethod
+    def learn(cls, poses: FloatArray, errors: FloatArray) -> Shrinkage:
+        """From all poses that are known, (n, d_y), and the errors at labels left out, (l, d_y)."""
+        C = np.atleast_2d(np.cov(poses, rowvar=False, bias=True))
+        # Poses that are all the same have no variance at all.
+        ridge = max(RIDGE * float(np.trace(C)) / len(C), np.finfo(np.float64).tiny)
+        R = np.diag(np.mean(errors**2, axis=0) + ridge)
+        return cls(poses.mean(axis=0), np.linalg.solve(C + R, C).astype(np.float64))
+
+    def __call__(self, poses: FloatArray) -> FloatArray:
+        """Likely poses in place of predicted ones, (T, d_y)."""
+        return self.mean + (poses - self.mean) @ self.matrix

@@ -117,7 +117,7 @@ def header_bomb(model):
 
 def with_nan(model):
     arrays, metadata = load(model.read_bytes()), metadata_of(model)
-    arrays["method.source.latents"] = np.full_like(arrays["method.source.latents"], np.nan)
+    arrays["method.source.mean"] = np.full_like(arrays["method.source.mean"], np.nan)
     model.write_bytes(save(arrays, metadata))
 
 
@@ -137,7 +137,7 @@ def missing(model):
         (pickled, "the header: expected a safetensors file"),
         (truncated, "the header: expected a valid safetensors header"),
         (header_bomb, "the header: expected a safetensors file"),
-        (with_nan, "method.source.latents: expected finite float64 numbers"),
+        (with_nan, "method.source.mean: expected finite float64 numbers"),
         (checkpoint, "format: expected facert-model, found 'facert-checkpoint'"),
         (missing, "expected"),
     ],

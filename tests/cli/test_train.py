@@ -10,8 +10,11 @@ import pytest
 
 import facert as api
 from facert.checkpoint import checkpoint_path
+from facert.cli.train import _shown
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
+# A method that trains step by step.
+SHARED = ("--method", "ssgplvm")
 
 
 @pytest.fixture
@@ -27,11 +30,20 @@ def model(tmp_path):
 
 
 def test_a_model_is_written_and_a_table_of_how_it_went(facert, take, model):
-    done = facert("train", take, "-o", model, *QUICK)
+    done = facert("train", take, "-o", model)
     assert done.code == 0
-    for word in ("objective", "iterations", "seconds", "theta1", "training reconstruction"):
+    assert "auto in " in done.out
+    for word in ("unlabelled poses", "seconds", "weight of factors", "training reconstruction"):
         assert word in done.out
     assert api.load(model).figures["labelled frames"] == 12
+    assert "warning" not in done.err
+
+
+def test_of_a_shared_model_the_table_tells_how_the_search_ended(facert, take, model):
+    done = facert("train", take, "-o", model, *QUICK, *SHARED)
+    assert done.code == 0
+    for word in ("objective", "iterations", "converged", "theta1"):
+        assert word in done.out
     assert not checkpoint_path(model).exists()
 
 
@@ -51,7 +63,8 @@ def test_options_come_before_the_config_file(facert, take, model, tmp_path):
 
 
 def test_the_curve_is_logged(facert, take, model, tmp_path):
-    assert facert("train", take, "-o", model, "--log", tmp_path / "curve.csv", *QUICK).code == 0
+    options = ("--log", tmp_path / "curve.csv", *QUICK, *SHARED)
+    assert facert("train", take, "-o", model, *options).code == 0
     curve = np.genfromtxt(tmp_path / "curve.csv", delimiter=",", names=True)
     assert curve["objective"][-1] == api.load(model).figures["objective"]
     assert (np.diff(curve["objective"]) < 0).all()
@@ -66,7 +79,8 @@ def test_existing_outputs_stay_unless_they_may_be_replaced(facert, take, model, 
     assert facert("train", take, "-o", model, "--overwrite", *QUICK).code == 0
     (tmp_path / "curve.csv").write_text("mine")
     other = tmp_path / "other.safetensors"
-    assert facert("train", take, "-o", other, "--log", tmp_path / "curve.csv", *QUICK).code == 2
+    options = ("--log", tmp_path / "curve.csv", *QUICK, *SHARED)
+    assert facert("train", take, "-o", other, *options).code == 2
     assert (tmp_path / "curve.csv").read_text() == "mine"
     assert not other.exists()
 
@@ -95,7 +109,9 @@ main()
 def slow(tmp_path):
     """Settings that leave time to stop a run."""
     path = tmp_path / "slow.toml"
-    path.write_text("checkpoint_every = 15\ntolerance = 0.0\nmax_iterations = 300\n")
+    path.write_text(
+        'method = "ssgplvm"\ncheckpoint_every = 15\ntolerance = 0.0\nmax_iterations = 300\n'
+    )
     return path
 
 
@@ -121,7 +137,7 @@ def test_a_killed_run_resumes_to_the_same_objective(facert, make_take, slow, tmp
 
 def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow, model, tmp_path):
     take, quick = tmp_path / "take.h5", tmp_path / "quick.toml"
-    quick.write_text("checkpoint_every = 15\nmax_iterations = 5000\n")
+    quick.write_text('method = "ssgplvm"\ncheckpoint_every = 15\nmax_iterations = 5000\n')
     api.write_take(make_take(frames=160, animation=100), take)
     arguments = ("train", take, "-o", model, "--config", slow)
     assert stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model)) == 130
@@ -152,9 +168,34 @@ def test_a_checkpoint_of_another_take_is_refused(facert, make_take, take, slow, 
 
 
 def test_resuming_without_a_checkpoint_trains_anew(facert, take, model):
-    done = facert("train", take, "-o", model, *QUICK, "--resume")
+    done = facert("train", take, "-o", model, *QUICK, *SHARED, "--resume")
     assert done.code == 0
     assert "training begins anew" in done.err
+
+
+def idle(options):
+    return f"warning: auto learns in one go: nothing to do for {options}"
+
+
+def test_a_method_that_learns_in_one_go_says_what_it_has_no_use_for(facert, take, model, tmp_path):
+    curve = tmp_path / "curve.csv"
+    done = facert("train", take, "-o", model, "--log", curve, "--resume")
+    assert done.code == 0
+    assert done.err.splitlines().count(idle("--resume and --log")) == 1
+    assert not curve.exists()
+    assert idle("--log") in facert("train", take, "-o", model, "--log", curve, "--overwrite").err
+
+
+def test_a_method_that_learns_in_one_go_leaves_the_checkpoint_of_another_alone(facert, take, model):
+    checkpoint_path(model).write_text("where another run stopped")
+    model.write_text("mine")
+
+    refused = facert("train", take, "-o", model, "--resume")
+    assert refused.code == 2
+    assert idle("--resume") in refused.err
+    assert model.read_text() == "mine"
+    assert facert("train", take, "-o", model, "--overwrite").code == 0
+    assert checkpoint_path(model).read_text() == "where another run stopped"
 
 
 def rewrite(path, change):
@@ -221,7 +262,7 @@ def remove(path, make_take):
         (spoil_nothing, ("--labels", 99), "take.h5: labels: expected at most 12"),
         (spoil_nothing, ("--latent-dim", 0), "the options: latent_dim: expected at least 1"),
         (spoil_nothing, ("--optimizer", "adam"), "the options: optimizer: expected one of"),
-        (spoil_nothing, ("--method", "magic"), "method: expected one of ssgplvm"),
+        (spoil_nothing, ("--method", "magic"), "error: method: expected one of auto"),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_no_file(
@@ -254,8 +295,9 @@ def test_a_slip_in_the_config_file_is_named(facert, take, model, tmp_path, conte
     assert not model.exists()
 
 
-def test_a_device_that_is_not_there_is_wrong_usage(facert, take, model):
-    failed = facert("train", take, "-o", model, "--device", "cuda:99")
+@pytest.mark.parametrize("method", ["auto", "ssgplvm", "ridge"])
+def test_a_device_that_is_not_there_is_wrong_usage(facert, take, model, method):
+    failed = facert("train", take, "-o", model, "--method", method, "--device", "cuda:99")
     assert failed.code == 2
     assert "--device cuda:99" in failed.err
     assert not model.exists()
@@ -271,7 +313,7 @@ def test_resume_without_a_checkpoint_does_not_replace_a_finished_model(facert, t
     assert facert("train", take, "-o", model).code == 0
     finished = model.read_bytes()
 
-    refused = facert("train", take, "-o", model, "--labels", 5, "--resume")
+    refused = facert("train", take, "-o", model, "--labels", 5, *SHARED, "--resume")
     assert refused.code == 2
     assert model.read_bytes() == finished
 
@@ -286,3 +328,19 @@ def test_the_log_goes_on_where_a_stopped_run_left_it(facert, make_take, slow, mo
     assert facert(*arguments, "--resume").code == 0
     assert curve.read_text().startswith(begun)
     assert len(curve.read_text()) > len(begun)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.0, "0"),
+        (0.25, "0.25"),
+        (1 / 3, "0.333"),
+        (-12345.6789, "-12345.679"),
+        (40.0, "40"),
+        (1.23456e-5, "1.23e-05"),
+        (float("nan"), "-"),
+    ],
+)
+def test_numbers_are_shown_as_short_as_they_can_be(value, shown):
+    assert _shown(value) == shown

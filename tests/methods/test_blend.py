@@ -1,116 +1,179 @@
-"""Features from all frames, shrinkage by all poses."""
+"""`auto`: experts, and how they share."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.blend import SemiSupervisedGPR, blend_weights
-from facert.methods.features import noise_variance, whitening
-from facert.methods.linear import leave_one_out_ridge
-from facert.methods.shrinkage import shrinkage
+from facert.methods.blend import MOST_POSES, TOGETHER, Auto, _fewer_poses, blend_weights
+from facert.metrics import rms
 from facert.settings import Settings
 
 
-def frames(n=2000, d=12, rank=4, noise=0.0, seed=0):
-    """Frames that move in a few directions, each a third as far as the one before."""
+def data(labels=12, frames=300, poses=200, seed=3, bend=0.5):
+    """Poses that follow frames of rank 6, the more so the larger `bend` in a curve; and a test."""
     rng = np.random.default_rng(seed)
-    directions, _ = np.linalg.qr(rng.normal(size=(d, d)))
-    signal = rng.normal(size=(n, rank)) * 3.0 ** -np.arange(rank)
-    return signal @ directions[:, :rank].T + noise * rng.normal(size=(n, d))
+    Z = rng.normal(size=(labels + frames + poses + 300, 6))
+    X = Z @ rng.normal(size=(6, 24)) / 2.5 + 0.1 * rng.normal(size=(len(Z), 24))
+    Y = np.tanh(bend * Z @ rng.normal(size=(6, 9)) / 2.5) / bend
+    first, second = labels + frames, labels + frames + poses
+    return (
+        Labelled(X[:labels], Y[:labels]),
+        Unlabelled(X[labels:first], Y[first:second]),
+        Labelled(X[second:], Y[second:]),
+    )
 
 
-@pytest.mark.parametrize("power", [0.0, 0.5, 1.0])
-def test_whitening_divides_each_direction_by_a_power_of_its_deviation(power):
-    X = frames()
-    phi = (X - X.mean(axis=0)) @ whitening(X, power)
-    deviations = np.sort(phi.std(axis=0))[::-1][:4]
-    raw = np.sqrt(np.sort(np.linalg.eigvalsh(np.cov(X.T, bias=True)))[::-1][:4])
-
-    np.testing.assert_allclose(deviations, raw ** (1.0 - power), rtol=0.02)
+def fitted(labelled, unlabelled, name="auto"):
+    method = make_method(Settings(method=name))
+    method.fit(labelled, unlabelled)
+    return method
 
 
-def test_directions_of_noise_alone_are_left_out():
-    X = frames(noise=0.01)
-
-    assert np.count_nonzero(whitening(X, 0.5).any(axis=0)) == 4
-
-
-def test_noise_is_known_from_the_directions_without_motion():
-    X = frames(noise=0.05)
-    variances = np.linalg.eigvalsh(np.cov(X.T))
-
-    assert noise_variance(variances) == pytest.approx(0.05**2, rel=0.1)
+@pytest.fixture(scope="module")
+def auto():
+    return fitted(*data()[:2])
 
 
-def test_features_turn_with_the_source():
-    X = frames(noise=0.01)
-    turn, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(12, 12)))
-    phi, turned = X @ whitening(X, 0.5), (X @ turn) @ whitening(X @ turn, 0.5)
+def test_it_is_better_than_each_supervised_method_and_unlabelled_data_is_why():
+    labelled, unlabelled, test = data(labels=10, bend=0.2)
+    nothing = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
 
-    np.testing.assert_allclose(phi @ phi.T, turned @ turned.T, atol=1e-9)
+    def error(name, unlabelled):
+        return rms(fitted(labelled, unlabelled, name).predict(test.X).Y - test.Y)
 
-
-def test_a_perfect_regression_is_not_shrunk_and_a_useless_one_becomes_the_mean():
-    poses = np.random.default_rng(0).normal(size=(200, 5))
-
-    np.testing.assert_allclose(shrinkage(poses, np.zeros((20, 5))), np.eye(5), atol=1e-5)
-    np.testing.assert_allclose(shrinkage(poses, np.full((20, 5), 1e4)), 0.0, atol=1e-6)
+    best = min(error(name, nothing) for name in ("gpr", "gpr-linear", "ridge", "pls"))
+    assert error("auto", unlabelled) < 0.9 * best
+    assert error("auto", unlabelled) < 0.8 * error("auto", nothing)
 
 
-def test_a_control_that_is_predicted_badly_is_told_by_the_one_it_goes_with():
-    x = np.random.default_rng(0).normal(size=500)
-    poses = np.column_stack([x, 2.0 * x])
-    errors = np.tile([0.01, 100.0], (20, 1))
+def test_poses_lie_between_what_the_experts_say(auto):
+    test = data()[2]
+    map_ = auto.map_
+    factors, missed = map_.factors(test.X)[0], map_.residual(test.X)[0]
+    low, high = map_.range
+    clipped = np.clip(factors, low, high)
+    said = np.clip(
+        [
+            map_.plain(test.X)[0],
+            map_.whitened(test.X)[0],
+            map_.shrinkage(clipped),
+            map_.residual_shrinkage(np.clip(clipped + missed, low, high)),
+        ],
+        low,
+        high,
+    )
+    pose = auto.predict(test.X).Y
+    np.testing.assert_allclose(pose, sum(w * s for w, s in zip(map_.weights, said, strict=True)))
 
-    np.testing.assert_allclose([1.0, 0.0] @ shrinkage(poses, errors), [1.0, 2.0], rtol=0.01)
+
+def test_no_pose_leaves_the_range_of_those_that_are_known(auto):
+    labelled, unlabelled, test = data()
+    poses = np.vstack([labelled.Y, unlabelled.Y])
+    pose = auto.predict(5.0 * test.X).Y
+    assert (pose >= poses.min(axis=0) - 1e-12).all()
+    assert (pose <= poses.max(axis=0) + 1e-12).all()
 
 
-def test_more_unlabelled_frames_and_poses_help():
-    rng = np.random.default_rng(3)
-    X = frames(n=400, d=30, rank=8, noise=0.02, seed=3)
-    Y = np.tanh(X @ rng.normal(size=(30, 6)))
+def test_the_error_that_is_told_is_about_the_true_one():
+    labelled, unlabelled, test = data(labels=40)
+    method = Auto(Settings())
+    report = method.fit(labelled, unlabelled)
+    true = rms(method.predict(test.X).Y - test.Y)
+    assert 0.7 * true < report.figures["error at poses left out"] < 1.4 * true
 
-    def error(count):
-        method = SemiSupervisedGPR(Settings(method="ssgpr"))
-        method.fit(Labelled(X[:12], Y[:12]), Unlabelled(X[12 : 12 + count], Y[12 : 12 + count]))
-        return np.sqrt(np.mean((method.predict(X[212:]).Y - Y[212:]) ** 2))
 
-    assert error(200) < 0.95 * error(0)
+def test_the_report_names_experts_and_what_was_used():
+    report = Auto(Settings()).fit(*data()[:2])
+    weights = [value for name, value in report.figures.items() if name.startswith("weight of")]
+    assert len(weights) == 4
+    assert sum(weights) == pytest.approx(1.0)
+    assert report.figures["unlabelled frames"] == 300
+    assert report.figures["unlabelled poses"] == 200
+
+
+def test_of_very_many_poses_some_are_drawn_by_the_seed():
+    poses = np.arange(2.0 * MOST_POSES)[:, None]
+    some, same, other = (_fewer_poses(Unlabelled(poses, poses), seed).Y for seed in (0, 0, 1))
+    assert len(some) == len(np.unique(some)) == MOST_POSES
+    assert (np.diff(some[:, 0]) > 0).all()
+    np.testing.assert_array_equal(some, same)
+    assert (some != other).any()
+    assert len(_fewer_poses(Unlabelled(poses, poses[:9]), 0).Y) == 9
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3])
+def test_poses_that_are_all_the_same_stay_the_same(value):
+    labelled, unlabelled, test = data()
+    method = fitted(
+        Labelled(labelled.X, np.full_like(labelled.Y, value)),
+        Unlabelled(unlabelled.X, np.full_like(unlabelled.Y, value)),
+    )
+    np.testing.assert_allclose(method.predict(test.X).Y, value)
+
+
+def test_a_switch_is_learned():
+    labelled, unlabelled, test = data(labels=30)
+
+    def on(Y):
+        return (Y[:, :2] > 0.0).astype(float)
+
+    method = fitted(
+        Labelled(labelled.X, on(labelled.Y)), Unlabelled(unlabelled.X, on(unlabelled.Y))
+    )
+    assert np.mean((method.predict(test.X).Y > 0.5) == on(test.Y)) > 0.85
+
+
+def errors(seed=0):
+    return list(np.random.default_rng(seed).normal(size=(4, 10, 3)))
 
 
 def test_weights_are_shares():
-    errors = list(np.random.default_rng(0).normal(size=(4, 10, 3)))
-    weights = blend_weights(errors)
+    weights = blend_weights(errors())
 
     assert weights.sum() == pytest.approx(1.0)
     assert (weights >= 0).all()
 
 
-def test_experts_that_are_alike_share_alike_and_a_far_better_one_takes_all():
-    error = np.random.default_rng(0).normal(size=(10, 3))
+@pytest.mark.parametrize("seed", range(3))
+def test_weights_are_the_best_shares(seed):
+    missed = errors(seed)
+    least = min(np.sum(e**2) for e in missed)
 
+    def cost(weights):
+        mixed = np.tensordot(weights, np.array(missed), axes=1)
+        return np.sum(mixed**2) + TOGETHER * least * np.sum(weights**2)
+
+    best = cost(blend_weights(missed))
+    for shares in np.random.default_rng(seed).dirichlet(np.ones(4), 200):
+        assert cost(shares) >= best
+
+
+def test_the_unit_of_the_errors_does_not_matter():
+    np.testing.assert_allclose(
+        blend_weights([1e-3 * e for e in errors()]), blend_weights(errors()), atol=1e-12
+    )
+
+
+def test_experts_that_are_alike_share_alike_and_the_better_one_gets_more():
+    error = errors()[0]
     np.testing.assert_allclose(blend_weights([error, error, error]), 1 / 3)
-    np.testing.assert_allclose(blend_weights([0.01 * error, error]), [1.0, 0.0], atol=1e-3)
+    shares = [blend_weights([factor * error, error])[0] for factor in (1.0, 0.8, 0.5, 0.01)]
+    assert all(a <= b for a, b in pairwise(shares))
+    assert shares[1] > shares[0]
+    assert shares[-1] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_experts_that_err_in_opposite_ways_are_mixed():
-    error = np.random.default_rng(0).normal(size=(10, 3))
-
+    error = errors()[0]
     np.testing.assert_allclose(blend_weights([error, -error]), [0.5, 0.5])
 
 
-def test_ridge_knows_what_it_misses_of_a_row_that_is_left_out():
-    rng = np.random.default_rng(1)
-    X, Y = rng.normal(size=(15, 6)), rng.normal(size=(15, 2))
-    found = leave_one_out_ridge(X, Y)
-    penalties = found.penalties * np.sum(X * X) / len(X)
-
-    for row in range(len(X)):
-        kept = np.arange(len(X)) != row
-        for control, penalty in enumerate(penalties):
-            gram = X[kept].T @ X[kept] + penalty * np.eye(6)
-            weights = np.linalg.solve(gram, X[kept].T @ Y[kept, control])
-            missed = Y[row, control] - X[row] @ weights
-            assert found.left_out_errors[row, control] == pytest.approx(missed, rel=1e-6)
+def test_an_expert_that_misses_nothing_takes_all():
+    error = errors()[0]
+    np.testing.assert_allclose(blend_weights([0.0 * error, error]), [1.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(blend_weights([0.0 * error, 0.0 * error]), 0.5)

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 import facert
 from facert import Controls, InputError, Settings, Source
+from facert.errors import DeviceError
 from facert.methods import REGISTRY, make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.metrics import rms
@@ -205,6 +207,20 @@ def test_labels_that_repeat_do_no_harm(name):
     labelled, unlabelled = make_data()
     twice = Labelled(np.repeat(labelled.X, 2, axis=0), np.repeat(labelled.Y, 2, axis=0))
     assert np.isfinite(fitted(name, twice, unlabelled).predict(unlabelled.X).Y).all()
+
+
+@every_method
+@pytest.mark.parametrize("device", ["cuda:99", "abacus"])
+def test_a_device_that_is_not_there_is_never_replaced_in_silence(name, device):
+    method = make_method(Settings(method=name, device=device))
+    with pytest.raises(DeviceError, match=f"--device {device}.*Use --device cpu"):
+        method.fit(*make_data())
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_a_method_that_has_no_use_for_a_device_says_so(caplog):
+    make_method(Settings(method="auto", device="cuda")).fit(*make_data())
+    assert "auto trains on the CPU: cuda is not used" in caplog.text
 
 
 def test_an_unknown_method_is_told_with_the_known_ones():

@@ -11,7 +11,7 @@ from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import blocked_folds
 from facert.methods.interpolation import SMOOTHING
-from facert.methods.linear import _poses_by_components
+from facert.methods.linear import _poses_by_components, leave_one_out_ridge
 from facert.methods.svr import PackedMap
 from facert.metrics import rms
 from facert.settings import Settings
@@ -52,6 +52,21 @@ def test_each_control_has_its_own_penalty():
     predicted = fitted("ridge", X, Y).predict(X).Y
     np.testing.assert_allclose(predicted[:, :3], Y[:, :3], atol=1e-3)
     assert predicted[:, 3].std() < 0.8 * Y[:, 3].std()
+
+
+def test_ridge_knows_what_it_misses_of_a_row_that_is_left_out():
+    rng = np.random.default_rng(1)
+    X, Y = rng.normal(size=(15, 6)), rng.normal(size=(15, 2))
+    found = leave_one_out_ridge(X, Y)
+    penalties = found.penalties * np.sum(X * X) / len(X)
+
+    for row in range(len(X)):
+        kept = np.arange(len(X)) != row
+        for control, penalty in enumerate(penalties):
+            gram = X[kept].T @ X[kept] + penalty * np.eye(6)
+            weights = np.linalg.solve(gram, X[kept].T @ Y[kept, control])
+            missed = Y[row, control] - X[row] @ weights
+            assert found.left_out_errors[row, control] == pytest.approx(missed, rel=1e-6)
 
 
 def test_all_numbers_of_components_come_from_one_fit():
@@ -120,6 +135,8 @@ def test_folds_are_runs_of_neighbours_and_cover_every_label_once():
         ("ridge", {"map.weights": np.zeros((9, 4))}, "map.weights: expected 15 for x"),
         ("ridge", {"source.covariance": np.eye(9)}, "source.covariance: expected 15 for x"),
         ("ridge", {"source.covariance": -np.eye(15)}, "covariance: expected a positive definite"),
+        ("gpr", {"source.response": None}, "source.response: expected an array of 2"),
+        ("gpr", {"source.response": np.ones((15, 3))}, "source.response: expected 4 for y"),
         ("gpr", {"map.theta": np.ones(3)}, "map.theta: expected 4 for 4, found shape"),
         ("gpr", {"map.theta": -np.ones(4)}, "theta: expected positive numbers"),
         ("rbf", {"map.smoothing": np.ones(2)}, "map.smoothing"),

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from facert.errors import DeviceError
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.optim.monitor import Monitor
@@ -78,7 +77,8 @@ def test_the_fingerprint_tells_runs_apart_by_data_and_by_what_shapes_the_model()
 
     def fingerprint(data=None, **options):
         listener = Listener()
-        made = make_method(Settings(**{**QUICK, **options, "max_iterations": 1}))
+        options = {"method": "ssgplvm", **QUICK, **options, "max_iterations": 1}
+        made = make_method(Settings(**options))
         made.fit(*(data or make_data()), listener)
         return listener.heard
 
@@ -93,9 +93,3 @@ def test_the_fingerprint_tells_runs_apart_by_data_and_by_what_shapes_the_model()
         fingerprint(method="sgplvm"),
     ]
     assert len({fingerprint(), *others}) == len(others) + 1
-
-
-@pytest.mark.parametrize("device", ["cuda:99", "abacus"])
-def test_a_device_that_is_not_there_is_never_replaced_in_silence(device):
-    with pytest.raises(DeviceError, match=f"--device {device}.*Use --device cpu"):
-        fitted(device=device)

@@ -1,0 +1,34 @@
+"""Results as files: tables for people, and tidy ones for programs."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from facert.io.atomic import replacing
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> str:
+    """A table whose first columns are text and whose others are numbers."""
+    rules = ["---"] * texts + ["---:"] * (len(header) - texts)
+    return "\n".join(f"| {' | '.join(row)} |" for row in (header, rules, *rows)) + "\n"
+
+
+def write_text(path: Path, parts: Sequence[str]) -> None:
+    """Paragraphs and tables, with a line between them."""
+    with replacing(path, overwrite=True) as temporary:
+        temporary.write_text("\n".join(f"{part.strip()}\n" for part in parts), encoding="utf-8")
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
+    """One row a line, the names of the columns first."""
+    with replacing(path, overwrite=True) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
+
+
+def _plain(value: object) -> object:
+    """Numbers with six digits: more than are known."""
+    return f"{value:.6g}" if isinstance(value, float) else value

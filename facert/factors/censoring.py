@@ -1,0 +1,116 @@
+"""Poses at a limit say "at least so far": the model of Tobin (1958) for the controls of a rig.
+
+A control that ends at 0 or 1 spends much of a performance there, half of the time in some rigs. A
+linear model bends itself in vain to say exactly 0 in all those frames. So the pose is taken to be
+what limits leave of a *free* pose,
+
+    y = min(max(y*, low), high),      y* ~ N(m, s²):
+
+an entry at its limit stands for any y* beyond, of which a model m, s tells mean and variance, and
+what is to be expected of y is the mean of the clipped y*.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr, ndtr
+
+from facert.data import BoolArray, FloatArray, IntArray
+
+# A control is censored at a limit where at least so much of all poses lies exactly there, and more
+# than one: some pose is always the lowest.
+LEAST_SHARE = 0.2
+LEAST_COUNT = 2
+TOLERANCE = 1e-9  # relative to the range: "exactly"
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """How far controls go, infinite where poses do not pile up.
+
+    Parameters
+    ----------
+    low, high : arrays, shape (d_y,)
+    """
+
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, poses: FloatArray) -> Limits:
+        """Limits at which poses (n, d_y) pile up."""
+        low, high = poses.min(axis=0), poses.max(axis=0)
+        slack = TOLERANCE * (high - low)
+        moves = high > low
+        least = max(LEAST_SHARE * len(poses), LEAST_COUNT)
+        at_low = moves & (np.sum(poses <= low + slack, axis=0) >= least)
+        at_high = moves & (np.sum(poses >= high - slack, axis=0) >= least)
+        return cls(np.where(at_low, low, -np.inf), np.where(at_high, high, np.inf))
+
+    def expected(self, mean: FloatArray, std: FloatArray) -> FloatArray:
+        """E[y] of free poses y* with mean (T, d_y) and standard deviation (d_y,).
+
+        With r(t) = E[max(t + s ε, 0)] = t Φ(t/s) + s φ(t/s), it is m + r(low - m) - r(m - high).
+        """
+        return mean + _rectified(self.low - mean, std) - _rectified(mean - self.high, std)
+
+
+@dataclass(frozen=True, eq=False)
+class CensoredPoses:
+    """Poses, and which of their entries are at a limit.
+
+    Parameters
+    ----------
+    values : array, shape (n, d_y)
+    sign : array, shape (c,)
+        Of each entry at a limit: 1 at the lower, -1 at the upper one.
+    rows, columns : arrays of int, shape (c,)
+        Where it is.
+    """
+
+    values: FloatArray
+    sign: FloatArray
+    rows: IntArray
+    columns: IntArray
+
+    @classmethod
+    def of(cls, poses: FloatArray, limits: Limits) -> CensoredPoses:
+        """Find the entries of poses (n, d_y) that are at or beyond a limit."""
+        slack = TOLERANCE * np.ptp(poses, axis=0, keepdims=True) if len(poses) else 0.0
+        low: BoolArray = poses <= limits.low + slack
+        high: BoolArray = poses >= limits.high - slack
+        rows, columns = np.nonzero(low | high)
+        return cls(poses, np.where(low[rows, columns], 1.0, -1.0), rows, columns)
+
+    def free(self, mean: FloatArray, std: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What a model expects the free poses to be, (n, d_y), and their summed variances, (d_y,).
+
+        Parameters
+        ----------
+        mean : array, shape (n, d_y)
+        std : array, shape (d_y,)
+        """
+        values = self.values.copy()
+        at = self.rows, self.columns
+        s = std[self.columns]
+        expected, variance = _below(self.sign * mean[at], s, self.sign * values[at])
+        values[at] = self.sign * expected
+        total = np.bincount(self.columns, variance, minlength=values.shape[1])
+        return values, np.asarray(total, dtype=np.float64)
+
+
+def _below(mean: FloatArray, std: FloatArray, limit: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance of N(mean, std²) given that it is at most `limit`."""
+    a = (limit - mean) / std
+    ratio = np.exp(-0.5 * (a * a + LOG_2PI) - log_ndtr(a))  # φ(a)/Φ(a)
+    return mean - std * ratio, std**2 * np.maximum(1.0 - a * ratio - ratio**2, 0.0)
+
+
+def _rectified(mean: FloatArray, std: FloatArray) -> FloatArray:
+    t = mean / std
+    with np.errstate(invalid="ignore"):  # -inf times 0: no limit
+        value = mean * ndtr(t) + std * np.exp(-0.5 * (t * t + LOG_2PI))
+    return np.where(np.isneginf(mean), 0.0, value)

@@ -1,0 +1,26 @@
+"""Where a method trains."""
+
+from __future__ import annotations
+
+import torch
+
+from facert.errors import DeviceError
+
+
+def find_device(name: str) -> torch.device:
+    """The device of that name.
+
+    Raises
+    ------
+    DeviceError
+        When it is not there: training never falls back to another device in silence.
+    """
+    try:
+        device = torch.device(name)
+        if device.type not in ("cpu", "cuda"):
+            raise RuntimeError("only cpu and cuda are known to work")
+        torch.empty(0, device=device)
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        reason = str(error).splitlines()[0]
+        raise DeviceError(f"--device {name}: {reason}. Use --device cpu.") from None
+    return device

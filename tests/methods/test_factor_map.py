@@ -1,0 +1,104 @@
+"""Factors as a map, and what they would say of labels left out."""
+
+import numpy as np
+
+from facert.methods.base import Labelled, Unlabelled
+from facert.methods.factors import FactorMap, Trio, left_out_poses
+from facert.methods.folds import ranked_folds
+
+
+def data(labels=11, frames=60, poses=40, seed=0):
+    """Frames of rank 4 with noise, and poses that are linear in them, closed half of the time."""
+    rng = np.random.default_rng(seed)
+    Z = rng.normal(size=(labels + frames + poses, 4))
+    X = Z @ rng.normal(size=(4, 9)) + 0.05 * rng.normal(size=(len(Z), 9))
+    Y = np.maximum(Z @ rng.normal(size=(4, 5)), 0.0) + 1.0
+    return Labelled(X[:labels], Y[:labels]), Unlabelled(
+        X[labels : labels + frames], Y[labels + frames :]
+    )
+
+
+def map_of(low, high, spread=0.1):
+    """One control that is its one marker."""
+    bounds = np.array([[low], [high]])
+    censored = np.isfinite(bounds)
+    return FactorMap(
+        centre=np.zeros(1),
+        weights=np.ones((1, 1)),
+        offset=np.zeros(1),
+        spread=np.full(1, spread),
+        limits=np.where(censored, bounds, 0.0),
+        censored=censored.astype(float),
+    )
+
+
+def test_without_limits_the_map_is_linear():
+    X = np.linspace(-3.0, 3.0, 7)[:, None]
+    np.testing.assert_array_equal(map_of(-np.inf, np.inf)(X)[0], X)
+
+
+def test_limits_bend_the_map_smoothly_and_are_not_passed():
+    X = np.linspace(-3.0, 3.0, 601)[:, None]
+    pose, _ = map_of(0.0, 1.0)(X)
+    assert (pose > -1e-12).all()
+    assert (pose < 1.0 + 1e-12).all()
+    assert (np.diff(pose[:, 0]) > -1e-12).all()
+    far = np.abs(X) > 2.0
+    np.testing.assert_allclose(pose[far], np.clip(X, 0.0, 1.0)[far], atol=1e-12)
+    np.testing.assert_allclose(pose, np.clip(X, 0.0, 1.0), atol=0.041)  # s φ(0)
+
+
+def test_controls_that_are_often_closed_get_a_limit_there():
+    labelled, unlabelled = data()
+    factors = Trio.learn(labelled, unlabelled).factors
+    np.testing.assert_array_equal(factors.censored, [np.ones(5), np.zeros(5)])
+    np.testing.assert_allclose(factors.limits[0], 1.0)
+    assert (factors(unlabelled.X)[0] > 1.0).all()
+
+
+def test_ranked_folds_cover_every_label_once_and_each_has_calm_and_extreme_ones():
+    X = np.random.default_rng(0).normal(size=(23, 4))
+    far = np.linalg.norm(X - X.mean(axis=0), axis=1)
+    folds = ranked_folds(X)
+    np.testing.assert_array_equal(np.sort(np.concatenate([test for _, test in folds])), range(23))
+    for train, test in folds:
+        np.testing.assert_array_equal(np.sort(np.concatenate([train, test])), range(23))
+        assert far[test].min() < np.median(far) < far[test].max()
+
+
+def test_ranked_folds_do_not_depend_on_the_order_of_frames():
+    X = np.random.default_rng(0).normal(size=(23, 4))
+    order = np.random.default_rng(1).permutation(23)
+    folds = [test for _, test in ranked_folds(X)]
+    permuted = [np.sort(order[test]) for _, test in ranked_folds(X[order])]
+    for a, b in zip(folds, permuted, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_three_labels_are_left_out_one_by_one():
+    X = np.random.default_rng(0).normal(size=(3, 2))
+    assert [len(test) for _, test in ranked_folds(X)] == [1, 1, 1]
+
+
+def test_what_is_said_of_labels_left_out_does_not_depend_on_their_poses():
+    labelled, unlabelled = data()
+    said = left_out_poses(labelled, unlabelled)
+    assert said.shape == (3, 11, 5)
+    _, test = ranked_folds(labelled.X)[2]
+    poses = labelled.Y.copy()
+    poses[test] = 99.0
+    again = left_out_poses(Labelled(labelled.X, poses), unlabelled)
+    np.testing.assert_array_equal(again[:, test], said[:, test])
+    others = np.delete(np.arange(11), test)
+    assert (np.abs(again[:, others] - said[:, others]).max(axis=(1, 2)) > 0.1).all()
+
+
+def test_what_is_said_of_labels_left_out_is_what_a_map_without_them_says():
+    labelled, unlabelled = data()
+    said = left_out_poses(labelled, unlabelled)
+    train, test = ranked_folds(labelled.X)[0]
+    frames = np.vstack([unlabelled.X, labelled.X[test]])
+    rest = Labelled(labelled.X[train], labelled.Y[train])
+    trio = Trio.learn(rest, Unlabelled(frames, unlabelled.Y))
+    for map_, poses in zip((trio.plain, trio.whitened, trio.factors), said, strict=True):
+        np.testing.assert_array_equal(map_(labelled.X[test])[0], poses[test])

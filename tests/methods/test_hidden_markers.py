@@ -1,0 +1,99 @@
+"""The standard deviation of poses from frames that hide some of their markers."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from facert.methods import REGISTRY, make_method, method_class
+from facert.methods.base import Labelled, Unlabelled
+from facert.metrics import rms
+from facert.settings import Settings
+
+# Every regression that tells a standard deviation.
+TELLING = [
+    name
+    for name in REGISTRY
+    if not method_class(name).stepwise and method_class(name).map_type.tells_std
+]
+telling = pytest.mark.parametrize("name", TELLING)
+
+
+def data(seed=0):
+    """Frames and poses that four factors move, a few of them pairs; and a test."""
+    rng = np.random.default_rng(seed)
+    Z = rng.normal(size=(1000, 4))
+    X = Z @ rng.normal(size=(4, 12)) / 2.0 + 0.2 * rng.normal(size=(1000, 12))
+    Y = Z @ rng.normal(size=(4, 6)) / 2.0 + 0.2 * rng.normal(size=(1000, 6))
+    labelled, unlabelled = Labelled(X[:30], Y[:30]), Unlabelled(X[30:400], Y[400:600])
+    return labelled, unlabelled, Labelled(X[600:], Y[600:])
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """A method of each name, trained once."""
+    kept = {}
+
+    def train(name):
+        if name not in kept:
+            kept[name] = make_method(Settings(method=name))
+            kept[name].fit(*data()[:2])
+        return kept[name]
+
+    return train
+
+
+def hide(X, count, seed=0):
+    """So many of the columns of each frame are not observed."""
+    ranks = np.random.default_rng(seed).random(X.shape).argsort(axis=1)
+    return np.where(ranks < count, np.nan, X)
+
+
+def test_the_blend_and_all_gaussian_processes_are_tried_here():
+    assert set(TELLING) == {"auto", "ssgpr", "gpr", "gpr-linear"}
+
+
+@telling
+def test_of_complete_frames_it_is_the_maps_own(name, trained):
+    X = data()[2].X
+    method = trained(name)
+    np.testing.assert_array_equal(method.predict(X).std, method.map_(X)[1])
+
+
+@telling
+def test_poses_are_those_of_the_filled_frames(name, trained):
+    method, X = trained(name), hide(data()[2].X, 5)
+    np.testing.assert_array_equal(method.predict(X).Y, method.map_(method.gaps_.fill(X))[0])
+
+
+@telling
+def test_it_grows_with_what_is_hidden(name, trained):
+    X = data()[2].X
+    stds = [trained(name).predict(hide(X, count)).std for count in range(0, 13, 3)]
+    for less, more in pairwise(stds):
+        assert more.mean() > less.mean()
+    assert np.mean(stds[3] > stds[1]) > 0.9
+
+
+@telling
+def test_a_frame_that_shows_nothing_leaves_about_the_spread_of_all_poses(name, trained):
+    labelled, unlabelled, _ = data()
+    std = trained(name).predict(np.full((1, 12), np.nan)).std[0]
+    spread = np.vstack([labelled.Y, unlabelled.Y]).std(axis=0)
+    np.testing.assert_allclose(std, spread, rtol=0.35)
+
+
+@telling
+@pytest.mark.parametrize("count", [0, 3, 6, 9, 12])
+def test_it_is_within_a_factor_of_two_of_the_errors(name, trained, count):
+    test = data()[2]
+    predicted = trained(name).predict(hide(test.X, count))
+    assert 0.5 < rms((predicted.Y - test.Y) / predicted.std) < 2.0
+
+
+@telling
+def test_it_is_kept_with_the_model(name, trained):
+    X = hide(data()[2].X, 5)
+    loaded = make_method(Settings(method=name))
+    loaded.load(trained(name).save())
+    np.testing.assert_allclose(loaded.predict(X).std, trained(name).predict(X).std)
