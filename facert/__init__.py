@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
+    from facert.posing.pose import complete_pose
     from facert.retargeter import Retargeter, load
     from facert.settings import Settings
     from facert.training import train
@@ -37,6 +38,7 @@ __all__ = [
     "Settings",
     "Source",
     "Take",
+    "complete_pose",
     "load",
     "read_rig",
     "read_take",
@@ -53,6 +55,7 @@ _HOMES = {
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data", "Source"),
     "Take": ("facert.data", "Take"),
+    "complete_pose": ("facert.posing.pose", "complete_pose"),
     "load": ("facert.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),

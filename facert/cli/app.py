@@ -20,6 +20,7 @@ from facert.cli import (
     inspect,
     plot,
     points,
+    pose,
     propagate,
     render,
     retarget,
@@ -71,6 +72,7 @@ def options(
 
 app.command("train")(train.command)
 app.command("retarget")(retarget.command)
+app.command("pose")(pose.command)
 app.command("propagate")(propagate.command)
 app.command("drive")(drive.command)
 app.add_typer(points.app, name="points")

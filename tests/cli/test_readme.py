@@ -32,7 +32,7 @@ def test_quick_start_and_python_run_as_printed(facert, tmp_path, monkeypatch):
     exec(PYTHON[1], {})  # poses for a recording
     assert facert("inspect", "take.h5").code == 0
 
-    assert len(COMMANDS) == 6
+    assert len(COMMANDS) == 8
     assert (tmp_path / "curves.png").exists()
     assert (tmp_path / "python.h5").exists()
 

@@ -1,0 +1,152 @@
+"""``facert pose``: a whole pose from a few controls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+from facert.cli.train import DEFAULT_MODEL
+from facert.errors import InputError, OutputExistsError, reading
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from facert.data import Take
+    from facert.posing.pose import CompletedPose
+    from facert.retargeter import Retargeter
+
+SMALL = 0.005  # of a control's range: such values are not worth a line
+
+
+def command(
+    wanted: Annotated[
+        list[str],
+        typer.Option("--set", metavar="NAME=VALUE", help="A control; again for more."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="A take (.h5, .csv, .livelink.csv), or .json."),
+    ] = None,
+    model: Annotated[
+        Path, typer.Option("--model", "-m", help="Model file that train wrote.")
+    ] = DEFAULT_MODEL,
+    poses: Annotated[
+        Path | None, typer.Option("--poses", help="A take with known poses, instead of a model's.")
+    ] = None,
+    start: Annotated[
+        str, typer.Option("--from", metavar="TAKE:FRAME", help="Correct this retargeted frame.")
+    ] = "",
+    soft: Annotated[
+        float, typer.Option(min=0.0, help="Standard deviation of the values; 0: exactly.")
+    ] = 0.0,
+    samples: Annotated[int, typer.Option(min=0, max=10_000, help="Other plausible poses.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="For the samples.")] = 0,
+    target: Annotated[
+        str | None, typer.Option(help="Which of several targets of .npz takes.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the output.")] = False,
+) -> None:
+    """Find the most probable whole pose given a few controls."""
+    given = _parse(wanted)
+    if output is not None and output.exists() and not overwrite:
+        raise OutputExistsError(output)
+    import facert
+
+    retargeter = facert.load(model) if start or poses is None else None
+    begun = _retargeted(start, retargeter, target) if retargeter and start else None
+    character = facert.read_take(poses, target) if poses else retargeter
+    assert character is not None
+    with reading(poses or model):
+        done = facert.complete_pose(
+            character, given, soft=soft, samples=samples, seed=seed, start=begun
+        )
+    console.out.print(_table(done, soft))
+    if output is not None:
+        _write(done, output, overwrite)
+        console.out.print(f"wrote {output}", markup=False)
+
+
+def _parse(wanted: list[str]) -> dict[str, float]:
+    """Names and values of ``NAME=VALUE``."""
+    given: dict[str, float] = {}
+    for text in wanted:
+        name, _, value = text.rpartition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            name = ""
+        if not name.strip():
+            raise typer.BadParameter(f"{text!r}: write it as in --set jawOpen=0.3")
+        if name.strip() in given:
+            raise typer.BadParameter(f"{name.strip()} is set twice")
+        given[name.strip()] = number
+    return given
+
+
+def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
+    """The frame of ``TAKE:FRAME``, retargeted."""
+    from dataclasses import replace
+
+    import facert
+
+    path, _, number = start.rpartition(":")
+    if not path or not number.isdecimal():
+        raise typer.BadParameter(f"--from {start}: write it as in take.h5:120")
+    take, frame = facert.read_take(Path(path), target), int(number)
+    if frame >= len(take):
+        expected = f"a frame from 0 to {len(take) - 1}"
+        raise InputError("--from", expected, number, "Choose another.", where=path)
+    source = replace(take.source, values=take.source.values[[frame]])
+    one = replace(
+        take, time=take.time[[frame]], source=source, params=None, std=None, animation=None
+    )
+    with reading(path):
+        return retargeter.retarget(one)
+
+
+def _table(done: CompletedPose, soft: float) -> Table:
+    """What was given, then the others by size; those at rest are counted below."""
+    import numpy as np
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("control")
+    for title in ("value", "±"):
+        table.add_column(title, justify="right")
+    table.add_column("")
+    order = np.argsort(-np.abs(done.pose), kind="stable")
+    names = [done.controls.names[index] for index in order]
+    first = [index for index, name in zip(order, names, strict=True) if name in done.given]
+    others = [index for index, name in zip(order, names, strict=True) if name not in done.given]
+    least = SMALL * float(np.abs(done.pose).max())
+    shown = [index for index in others if abs(done.pose[index]) >= least]
+    for index in first + shown:
+        name, value = done.controls.names[index], done.pose[index]
+        spread = f"{done.std[index]:.3f}" if done.std[index] else ""
+        mark = "" if name not in done.given else f"near {done.given[name]:g}" if soft else "given"
+        style = "bold" if mark else None
+        table.add_row(Text(name), f"{value:.3f}", spread, mark, style=style)
+    if len(others) > len(shown):
+        table.caption = f"{len(others) - len(shown)} more at 0"
+        table.caption_justify = "left"
+    return table
+
+
+def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:
+    """A take with a pose a frame, or JSON."""
+    import json
+
+    import facert
+    from facert.io.atomic import replacing
+
+    if output.suffix.lower() != ".json":
+        facert.write_take(done.as_take, output, overwrite)
+        return
+    text = json.dumps(done.as_dict, indent=2, ensure_ascii=False)
+    with replacing(output, overwrite) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Posing a character: the most probable whole pose given a few of its controls."""

@@ -1,0 +1,74 @@
+"""A retargeted pose with some controls set right: what the others should then be.
+
+The errors of a retargeted pose go together as poses do: where the smile is too weak, so are the
+cheeks. But less so, since the source has told most of the pose. So they are taken to be what is
+left of the covariance C of known poses when each control has been seen with a noise of `SEEN` of
+its variance,
+
+    S = C - C (C + R)⁻¹ C,      R = SEEN diag C,
+
+scaled to the standard deviations that the model reports, if it does: E. With the error of the given
+controls known, or known with variance s², the rest of the pose follows:
+
+    y = p + E_:G (E_GG + s² I)⁻¹ (g - p_G).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.posing.completion import Posed
+from facert.posing.known import Given, KnownPoses
+
+SEEN = 0.1
+RIDGE = 1e-9  # relative to the mean variance of a control
+
+
+def correct(
+    start: FloatArray,
+    std: FloatArray | None,
+    known: KnownPoses,
+    given: Given,
+    samples: int,
+    rng: np.random.Generator,
+) -> Posed:
+    """Correct a pose.
+
+    Parameters
+    ----------
+    start : array, shape (P,)
+        The pose to begin with.
+    std : array, shape (P,), or None
+        Its standard deviation.
+    known : KnownPoses
+    given : Given
+        The controls that are set.
+    samples : int
+        How many other poses to draw.
+    rng : numpy.random.Generator
+    """
+    G, E = given.controls, _error_covariance(known.poses, std)
+    seen = E[np.ix_(G, G)] + given.soft**2 * np.eye(len(G))
+    gain = np.linalg.solve(seen, E[G]).T
+    pose = start + gain @ (given.values - start[G])
+    left = E - gain @ E[G]
+    variances, directions = np.linalg.eigh((left + left.T) / 2.0)
+    roots = directions * np.sqrt(np.maximum(variances, 0.0))
+    drawn = pose + rng.standard_normal((samples, len(pose))) @ roots.T
+    spread = np.sqrt(np.maximum(left.diagonal(), 0.0))
+    pose, drawn = known.clip(pose), known.clip(drawn)
+    if given.soft == 0.0:
+        pose[G], spread[G], drawn[:, G] = given.values, 0.0, given.values
+    return Posed(pose, spread, drawn)
+
+
+def _error_covariance(poses: FloatArray, std: FloatArray | None) -> FloatArray:
+    """E, (P, P)."""
+    C = np.atleast_2d(np.cov(poses, rowvar=False))
+    C[np.diag_indices_from(C)] += RIDGE * np.trace(C) / len(C)
+    S = C - C @ np.linalg.solve(C + SEEN * np.diag(C.diagonal()), C)
+    if std is None:
+        return S
+    scale = std / np.sqrt(S.diagonal())
+    return np.asarray(scale[:, None] * S * scale)

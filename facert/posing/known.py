@@ -1,0 +1,57 @@
+"""Known poses of a character, which tell what poses it makes; and what of a pose is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray
+
+# Beyond, more poses tell little, and a new set of given controls takes longer to learn.
+MOST = 500
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPoses:
+    """Poses of a character and what poses are clipped to.
+
+    Parameters
+    ----------
+    poses : array, shape (n, P)
+    bounds : array, shape (P, 2)
+        Infinite where nothing bounds a control.
+    """
+
+    poses: FloatArray
+    bounds: FloatArray
+
+    def clip(self, poses: FloatArray) -> FloatArray:
+        """Poses (n, P) within the bounds."""
+        return np.clip(poses, *self.bounds.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Some controls of a pose.
+
+    Parameters
+    ----------
+    controls : array of int, shape (k,)
+        Which.
+    values : array, shape (k,)
+    soft : float
+        Standard deviation of the values; at 0 they are met exactly.
+    """
+
+    controls: IntArray
+    values: FloatArray
+    soft: float = 0.0
+
+
+def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> FloatArray:
+    """The poses that are kept of labels (l, P) and animation (n, P): `MOST`, drawn at random."""
+    poses = labelled if animation is None else np.vstack([labelled, animation])
+    if len(poses) <= MOST:
+        return poses
+    return poses[np.sort(np.random.default_rng(seed).permutation(len(poses))[:MOST])]

@@ -1,0 +1,213 @@
+"""`complete_pose`: names and values in, a whole pose of the character out."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from facert.data import Controls, FloatArray, IntArray, Source, Take
+from facert.errors import InputError
+from facert.names import NameIndex, match, nearest
+from facert.posing.completion import Completion
+from facert.posing.correction import correct
+from facert.posing.known import Given, KnownPoses, keep
+from facert.retargeter import Retargeter
+
+log = logging.getLogger(__name__)
+
+LEAST = 3  # known poses
+FAR = 0.5  # from every known pose, in mean distances of two of them
+BEYOND = 1e-9  # of a control's range: rounding
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedPose:
+    """A whole pose of which some controls were given.
+
+    Parameters
+    ----------
+    controls : Controls
+        P of them.
+    given : mapping of str to float
+        What was asked for, by the names of the controls.
+    pose, std : arrays, shape (P,)
+        The most probable pose, and the standard deviation of each control.
+    samples : array, shape (N, P)
+        Other plausible poses.
+    """
+
+    controls: Controls
+    given: Mapping[str, float]
+    pose: FloatArray
+    std: FloatArray
+    samples: FloatArray
+
+    @property
+    def as_dict(self) -> dict[str, Any]:
+        """Everything by name, as plain values."""
+        return {
+            "given": dict(self.given),
+            "pose": self._named(self.pose),
+            "std": self._named(self.std),
+            "samples": [self._named(sample) for sample in self.samples],
+        }
+
+    @property
+    def as_take(self) -> Take:
+        """A take with a pose a frame, the most probable one first; its source is what was given."""
+        poses = np.vstack([self.pose, self.samples])
+        std = np.full_like(poses, np.nan)
+        std[0] = self.std
+        values = np.tile(list(self.given.values()), (len(poses), 1))
+        return Take(
+            time=np.arange(len(poses), dtype=np.float64),
+            source=Source(values, tuple(self.given)),
+            controls=self.controls,
+            params=poses,
+            std=std,
+            fps=1.0,
+        )
+
+    def _named(self, values: FloatArray) -> dict[str, float]:
+        return dict(zip(self.controls.names, values.tolist(), strict=True))
+
+
+def complete_pose(
+    character: Retargeter | Take,
+    given: Mapping[str, float],
+    *,
+    soft: float = 0.0,
+    samples: int = 0,
+    seed: int = 0,
+    start: Take | None = None,
+) -> CompletedPose:
+    """The most probable whole pose of a character, given some of its controls.
+
+    What poses are probable is learned from those that the character is known to make: the labels
+    and the animation that a model was trained on, or those of a take.
+
+    Parameters
+    ----------
+    character : Retargeter or Take
+        Where the known poses come from.
+    given : mapping of str to float
+        Values of some controls, named in any spelling.
+    soft : float
+        Standard deviation of the values, in the controls' own units: the pose may be so far from
+        them. At 0 it meets them exactly.
+    samples : int
+        How many other plausible poses to draw.
+    seed : int
+        For them.
+    start : Take, optional
+        One frame that was retargeted to this character: the values then correct its pose, see
+        `facert.posing.correction`.
+
+    Raises
+    ------
+    InputError
+        For unknown names (with the nearest one), values outside of declared limits, or a character
+        with fewer than three known poses.
+    """
+    controls, known = known_poses(character)
+    asked = _given(controls, given, soft)
+    if samples < 0:
+        raise InputError("samples", "a number from 0", f"{samples}", "Ask for some, or for none.")
+    _warn_of_range(controls, known, asked)
+    rng = np.random.default_rng(seed)
+    if start is None:
+        completion = Completion.learn(known, asked.controls)
+        _warn_if_far(completion, asked)
+        posed = completion.pose(asked, samples, rng)
+    else:
+        pose, std = _start(start, controls)
+        posed = correct(pose, std, known, asked, samples, rng)
+    names = [controls.names[index] for index in asked.controls]
+    named = dict(zip(names, asked.values.tolist(), strict=True))
+    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples)
+
+
+def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
+    """A character's controls, and the poses that it is known to make.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than three.
+    """
+    if isinstance(character, Take):
+        controls, poses, bounds = character.controls, _poses_of(character), None
+    else:
+        controls, poses, bounds = character.controls, character.poses, character.bounds
+    if poses is None or controls is None or len(poses) < LEAST:
+        found = "none" if poses is None else f"{len(poses)}"
+        fix = "Train the model again, or give a take with poses."
+        raise InputError("poses of the character", f"at least {LEAST}", found, fix)
+    if bounds is None:
+        bounds = controls.limits
+    if bounds is None:
+        bounds = np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
+    return controls, KnownPoses(keep(poses, None, seed=0), bounds)
+
+
+def _poses_of(take: Take) -> FloatArray | None:
+    if take.params is not None and len(take.labels):
+        return keep(take.params[take.labels], take.animation, seed=0)
+    return take.animation
+
+
+def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Given:
+    if not wanted:
+        raise InputError("given controls", "at least one", "none", "Set a control to a value.")
+    if not (math.isfinite(soft) and soft >= 0.0):
+        raise InputError("soft", "a standard deviation from 0", f"{soft}", "Give another.")
+    positions = _positions(list(wanted), controls.names)
+    values = np.array(list(wanted.values()), dtype=np.float64)
+    for name, position, value in zip(wanted, positions, values, strict=True):
+        low, high = (-np.inf, np.inf) if controls.limits is None else controls.limits[position]
+        slack = BEYOND * (high - low) if math.isfinite(high - low) else 0.0
+        if not (math.isfinite(value) and low - slack <= value <= high + slack):
+            raise InputError(
+                name, f"a value from {low:g} to {high:g}", f"{value:g}", "Keep to its limits."
+            )
+    return Given(positions, values, soft)
+
+
+def _positions(wanted: list[str], names: tuple[str, ...]) -> IntArray:
+    """Where the wanted controls stand among all; no two at one place."""
+    index = NameIndex(names)
+    for name in wanted:
+        if index.find(name) is None:
+            near = nearest(name, names)
+            fix = f"Did you mean {near!r}?" if near else f"There are {', '.join(names)}."
+            raise InputError("given controls", "names of controls", repr(name), fix)
+    return match(wanted, names, "given controls")
+
+
+def _warn_of_range(controls: Controls, known: KnownPoses, given: Given) -> None:
+    """Beyond every known value, what the others do is a guess."""
+    low, high = known.poses.min(axis=0), known.poses.max(axis=0)
+    for index, value in zip(given.controls, given.values, strict=True):
+        name, slack = controls.names[index], BEYOND * (high[index] - low[index])
+        if high[index] - low[index] <= BEYOND * max(abs(low[index]), 1.0):
+            log.warning("%s never moves in the known poses: it tells nothing of the others", name)
+        elif not low[index] - slack <= value <= high[index] + slack:
+            log.warning("%s is %g to %g in the known poses", name, low[index], high[index])
+
+
+def _warn_if_far(completion: Completion, given: Given) -> None:
+    if completion.farness(given.values) > FAR:
+        log.warning("no known pose comes near the given values: the others are a guess")
+
+
+def _start(take: Take, controls: Controls) -> tuple[FloatArray, FloatArray | None]:
+    """The one pose of a take, and its standard deviation where it has one."""
+    if take.controls is None or take.params is None or len(take.params) != 1:
+        raise InputError("start", "one frame with a pose", f"{len(take)} frames", "Retarget one.")
+    columns = match(controls.names, take.controls.names, "start: /target/names")
+    return take.params[0, columns], None if take.std is None else take.std[0, columns]

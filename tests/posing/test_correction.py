@@ -1,0 +1,75 @@
+"""A retargeted pose with some controls set right."""
+
+import numpy as np
+import pytest
+
+from facert.metrics import rms
+from facert.posing.correction import correct
+from facert.posing.known import Given, KnownPoses
+
+P = 6
+FREE = np.tile([-9.0, 9.0], (P, 1))
+G = np.array([0, 3])
+
+
+@pytest.fixture(scope="module")
+def world():
+    """Known poses of two factors, true poses, and what a model made of them, with its std."""
+    rng = np.random.default_rng(0)
+    weights = rng.normal(size=(2, P))
+    poses, truth = (rng.normal(size=(n, 2)) @ weights for n in (100, 200))
+    poses += 0.05 * rng.normal(size=poses.shape)
+    said = truth + 0.3 * rng.normal(size=(200, 2)) @ weights
+    return KnownPoses(poses, FREE), truth, said
+
+
+def corrected(known, start, values, soft=0.0, std=None, samples=0):
+    rng = np.random.default_rng(0)
+    return correct(start, std, known, Given(G, values, soft), samples, rng)
+
+
+def test_without_a_change_the_pose_stays(world):
+    known, _, said = world
+    np.testing.assert_allclose(corrected(known, said[0], said[0, G]).pose, said[0], atol=1e-12)
+
+
+def test_the_corrections_are_met_and_mend_the_others(world):
+    known, truth, said = world
+    done = np.array([corrected(known, s, t[G]).pose for s, t in zip(said, truth, strict=True)])
+    assert (done[:, G] == truth[:, G]).all()
+    rest = np.setdiff1d(np.arange(P), G)
+    assert rms(done[:, rest] - truth[:, rest]) < 0.7 * rms(said[:, rest] - truth[:, rest])
+
+
+def test_twice_the_correction_moves_the_others_twice_as_far(world):
+    known, _, said = world
+    once, twice = (
+        corrected(known, said[0], said[0, G] + step).pose - said[0] for step in (0.1, 0.2)
+    )
+    np.testing.assert_allclose(twice, 2.0 * once, atol=1e-12)
+
+
+def test_what_the_model_is_sure_of_stays(world):
+    known, _, said = world
+    std = np.full(P, 0.3)
+    std[5] = 1e-6
+    moved = corrected(known, said[0], said[0, G] + 0.5, std=std).pose - said[0]
+    assert abs(moved[5]) < 1e-4 < np.abs(moved[[1, 2, 4]]).min()
+
+
+def test_corrections_leave_less_uncertainty_and_soft_ones_are_met_in_part(world):
+    known, _, said = world
+    std = np.full(P, 0.3)
+    values = said[0, G] + 0.5
+    hard, soft = (corrected(known, said[0], values, s, std) for s in (0.0, 0.3))
+    assert (hard.std[G] == 0.0).all()
+    assert (hard.std <= soft.std).all()
+    assert (soft.std < std).all()
+    assert ((said[0, G] < soft.pose[G]) & (soft.pose[G] < values)).all()
+
+
+def test_samples_spread_as_is_told(world):
+    known, _, said = world
+    posed = corrected(known, said[0], said[0, G] + 0.2, std=np.full(P, 0.3), samples=4000)
+    assert (posed.samples[:, G] == posed.pose[G]).all()
+    np.testing.assert_allclose(posed.samples.std(axis=0), posed.std, rtol=0.1, atol=1e-12)
