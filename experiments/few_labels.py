@@ -72,7 +72,7 @@ def score(name: str, target: str, labels: int, unlabelled: int, repeats: int) ->
     for seed in range(repeats):
         take, test = draw(truth, labels, unlabelled, seed)
         known = truth.params[test]
-        given = Settings(seed=seed, unlabelled=unlabelled)
+        given = Settings(method="ssgplvm", seed=seed, unlabelled=unlabelled)
         rows.append(
             (
                 rms(gpr(take, take.source.matrix[test]) - known),

@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from experiments.bench.problem import bench_take, describe
-from facert import Settings, train
+from facert import Settings, Take, train
 from facert.data import FloatArray
 from facert.methods.base import Method
 from facert.threads import threads_for
@@ -34,15 +34,20 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=2000)
     count = parser.parse_args().frames
     name, take = bench_take()
-    retargeter = train(take, Settings())
+    print(f"mapping, {name}, up to {count} frames, 40 labels + 100 frames + 100 poses")
+    for method in ("auto", "ssgplvm"):
+        measure(take, method, count)
+
+
+def measure(take: Take, name: str, count: int) -> None:
+    retargeter = train(take, Settings(method=name, unlabelled=100))
     clean = retargeter.source_units.apply(take.source.matrix)[:count]
     hidden = np.random.default_rng(0).random((len(clean), clean.shape[1] // 3)) < 0.3
     gappy = np.where(np.repeat(hidden, 3, axis=1), np.nan, clean)
-    print(f"mapping, {name}, {len(clean)} frames, 140 source latents")
-    for label, frames in (("all markers", clean), ("30 % missing", gappy)):
+    for label, frames in ((f"{name}, all markers", clean), (f"{name}, 30 % missing", gappy)):
         spent = frame_by_frame(retargeter.method, frames)
         print(
-            f"{label:<14} frame by frame: median {np.median(spent):.3f} ms, "
+            f"{label:<21} frame by frame: median {np.median(spent):.3f} ms, "
             f"p99 {np.percentile(spent, 99):.3f} ms CPU"
         )
         rates = []
@@ -50,7 +55,7 @@ def main() -> None:
             began = time.process_time()
             retargeter.method.predict(frames)
             rates.append(len(frames) / (time.process_time() - began))
-        print(f"{label:<14} in one batch:   {describe(rates, 'frames/s CPU')}")
+        print(f"{label:<21} in one batch:   {describe(rates, 'frames/s CPU')}")
 
 
 if __name__ == "__main__":
