@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from facert.posing.pose import complete_pose
     from facert.retargeter import Retargeter, load
     from facert.settings import Settings
+    from facert.suggestion.frames import suggest_frames
     from facert.training import train
 
 __version__ = "0.1.0"
@@ -42,6 +43,7 @@ __all__ = [
     "load",
     "read_rig",
     "read_take",
+    "suggest_frames",
     "train",
     "write_take",
 ]
@@ -59,6 +61,7 @@ _HOMES = {
     "load": ("facert.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
+    "suggest_frames": ("facert.suggestion.frames", "suggest_frames"),
     "train": ("facert.training", "train"),
     "write_take": ("facert.io.formats", "write_take_file"),
 }

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 import facert
 from facert.cli import (
+    clean,
     console,
     convert,
     demo,
@@ -25,6 +26,8 @@ from facert.cli import (
     render,
     retarget,
     simulate,
+    stabilise,
+    suggest,
     train,
 )
 from facert.errors import FacertError
@@ -70,12 +73,15 @@ def options(
     console.configure(quiet, verbose)
 
 
+app.command("suggest")(suggest.command)
 app.command("train")(train.command)
 app.command("retarget")(retarget.command)
 app.command("pose")(pose.command)
 app.command("propagate")(propagate.command)
 app.command("drive")(drive.command)
 app.add_typer(points.app, name="points")
+app.command("stabilise")(stabilise.command)
+app.command("clean")(clean.command)
 app.command("convert")(convert.command)
 app.command("inspect")(inspect.command)
 app.command("simulate")(simulate.command)

@@ -5,6 +5,9 @@
 ``/source/markers`` (T, M, 3)              positions; or ``/source/weights`` (T, D)
 ``/source/names``   (M,) or (D,)           UTF-8
 ``/source/valid``   (T, M) or (T, D) bool  optional; False, like NaN: not observed
+``/source/std``     like the source        optional: standard deviation of a cleaned source
+``/source/filled``  (T, M) or (T, D) bool  optional: what cleaning filled in
+``/source/head``    (T, 4, 4)              optional: the motion that was removed, see `stabilise`
 ``/target/params``  (T, P)                 optional; a row of NaN: this frame has no pose
 ``/target/names``   (P,)                   UTF-8
 ``/target/limits``  (P, 2)                 optional
@@ -13,13 +16,20 @@
 attributes                                 format, format_version, fps, units, created_by,
                                            optional start_timecode, up_axis
 ==================  =====================  =========================================================
+
+``/source/std``, ``/source/filled`` and ``/source/head`` are written beside a take for who looks for
+them; reading passes over these and over anything else that it does not know.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facert.data import Controls, FloatArray, Source, Take
 from facert.errors import InputError
@@ -54,8 +64,21 @@ def read_take(path: Path) -> Take:
         )
 
 
-def write_take(take: Take, path: Path, overwrite: bool = False) -> None:
+def write_take(
+    take: Take,
+    path: Path,
+    overwrite: bool = False,
+    beside: Mapping[str, NDArray[Any]] = MappingProxyType({}),
+) -> None:
     """Write a take file; the same take gives the same bytes.
+
+    Parameters
+    ----------
+    take : Take
+    path : Path
+    overwrite : bool
+    beside : mapping, optional
+        Further arrays by their path in the file, which reading passes over.
 
     Raises
     ------
@@ -70,6 +93,8 @@ def write_take(take: Take, path: Path, overwrite: bool = False) -> None:
         file.array("/time", take.time)
         _write_source(file, take.source)
         _write_target(file, take)
+        for where, values in beside.items():
+            file.array(where, values)
 
 
 def _read_source(file: GuardedFile) -> Source:

@@ -1,0 +1,1 @@
+"""Markers as captures really are: head motion, bad markers, gaps and noise."""

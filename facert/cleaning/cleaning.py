@@ -1,0 +1,91 @@
+"""Cleaning a take: noise out, gaps filled, with how sure that is."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from facert.cleaning.estimate import estimate
+from facert.data import BoolArray, FloatArray, Take
+from facert.names import NameIndex
+
+if TYPE_CHECKING:
+    from facert.retargeter import Retargeter
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """A take with a cleaned source.
+
+    Parameters
+    ----------
+    take : Take
+    filled : array of bool, shape (T, M) or (T, D)
+        What had not been observed and is now known.
+    std : array, shape of the source's values, or None
+        Standard deviation of every value, where the method tells; NaN where there is none.
+    sigma : float or None
+        Standard deviation of the capture noise that was removed, in the take's units.
+    """
+
+    take: Take
+    filled: BoolArray
+    std: FloatArray | None = None
+    sigma: float | None = None
+
+
+def clean(take: Take, sigma: float | None = None) -> Cleaned:
+    """Fill gaps and remove noise by what the take itself tells, see `facert.cleaning.estimate`.
+
+    Parameters
+    ----------
+    take : Take
+        Frames are taken to be evenly spaced in time.
+    sigma : float, optional
+        Standard deviation of the capture noise, in the take's units; from the take by default.
+
+    Returns
+    -------
+    Cleaned
+        A marker or weight that was never observed stays NaN, with a warning.
+
+    Raises
+    ------
+    InputError
+        When nothing in the take moves.
+    """
+    source = take.source
+    found = estimate(source.matrix, sigma)
+    ever = np.asarray(source.valid.any(axis=0)).tolist()
+    lost = [n for n, seen in zip(source.names, ever, strict=True) if not seen]
+    if lost:
+        log.warning("never observed, left open: %s", ", ".join(lost))
+    cleaned = source.with_matrix(found.frames)
+    std = found.std.reshape(source.values.shape)
+    return Cleaned(
+        replace(take, source=cleaned), np.asarray(cleaned.valid & ~source.valid), std, found.sigma
+    )
+
+
+def clean_with_model(take: Take, retargeter: Retargeter) -> Cleaned:
+    """Fill gaps and remove noise by a trained model, which knows the actor from its training take.
+
+    The result holds the model's markers or weights, without uncertainty.
+
+    Raises
+    ------
+    InputError
+        When the source does not suit the model.
+    """
+    found = retargeter.retarget(take).source
+    index = NameIndex(take.source.names)
+    places = [index.find(name) for name in found.names]
+    shown = np.zeros(found.valid.shape, dtype=np.bool_)
+    there = [column for column, place in enumerate(places) if place is not None]
+    shown[:, there] = take.source.valid[:, [place for place in places if place is not None]]
+    return Cleaned(replace(take, source=found), np.asarray(found.valid & ~shown))

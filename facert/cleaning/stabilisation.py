@@ -1,0 +1,246 @@
+"""Taking the head's rigid motion out of markers.
+
+Some markers sit where skin hardly moves against the skull. The motion of their rigid shape is the
+head's: found for all frames at once by weighted least squares, where a marker that strays in some
+frames loses its weight there (iteratively reweighted, with the weights of Geman and McClure 1987).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from facert.cleaning.rigid import RigidMotion, align, determined, mean_motion
+from facert.data import BoolArray, FloatArray, IntArray, Source, Take
+from facert.errors import InputError
+from facert.names import match
+
+SHARE, FEWEST = 0.3, 5
+"""How many markers are taken for stable: this share of all, this many at least."""
+SHAPES, REWEIGHTED = 3, 5
+"""How often the shape is estimated anew, and for each shape the weights."""
+ORDINARY = 0.95
+"""This share of all distances from the rigid shape is ordinary: skin and noise."""
+STRAY = 3.0
+"""At so many times an ordinary distance a marker has a quarter of its weight."""
+PAIRS_AT_ONCE, FEWEST_FRAMES, MOST_FRAMES = 20_000_000, 50, 500
+
+
+@dataclass(frozen=True, eq=False)
+class Stabilised:
+    """A take without head motion, and what was removed.
+
+    Parameters
+    ----------
+    take : Take
+    head : RigidMotion
+        Takes the stabilised markers to the recorded ones.
+    stable : array of int
+        The markers whose motion was taken for the head's.
+    interpolated : array of bool, shape (T,)
+        Frames that show too few of them.
+    residual : float
+        Root mean square motion that is left to the stable markers, in the take's units.
+    """
+
+    take: Take
+    head: RigidMotion
+    stable: IntArray
+    interpolated: BoolArray
+    residual: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the stable markers."""
+        return tuple(self.take.source.names[index] for index in self.stable)
+
+    @property
+    def shifts(self) -> FloatArray:
+        """How far the head moved the middle of the stable markers, (T,)."""
+        middle = np.nanmedian(self.take.source.values[:, self.stable], axis=(0, 1))
+        return np.asarray(np.linalg.norm(self.head.apply(middle[None])[:, 0] - middle, axis=1))
+
+
+def stabilise(
+    take: Take,
+    stable: Sequence[str] | Literal["automatic"] = "automatic",
+    reference: int | Literal["mean"] = "mean",
+) -> Stabilised:
+    """Remove the head's rigid motion.
+
+    Parameters
+    ----------
+    take : Take
+        Of markers; gaps are allowed.
+    stable : sequence of str, or "automatic"
+        Names of markers that hardly move against the skull, or `stable_markers`.
+    reference : int or "mean"
+        The frame whose head pose all frames get, or the mean pose.
+
+    Returns
+    -------
+    Stabilised
+        Frames that show fewer than three stable markers get the motion of their neighbours in
+        time.
+
+    Raises
+    ------
+    InputError
+        For a source of weights, unknown names, fewer than three stable markers or markers on a
+        line, a frame that the take has not or that does not show its own pose, or a take of which
+        no frame shows enough.
+    """
+    markers = _markers(take.source)
+    chosen = _chosen(take.source, stable)
+    shape = _mean_shape(markers[:, chosen])
+    seen = ~np.isnan(markers[:, chosen, 0])
+    known = determined(shape, seen)
+    _require_known(known)
+    shape, motion = _rigid(shape, markers[:, chosen], known)
+    motion = motion.interpolated(take.time, known)
+    head = motion.after(_pose(motion, known, reference).inverse())
+    left = np.linalg.norm(motion.undo(markers[:, chosen]) - shape, axis=2)[known[:, None] & seen]
+    return Stabilised(
+        replace(take, source=Source(head.undo(markers), take.source.names)),
+        head,
+        chosen,
+        ~known,
+        float(np.sqrt(np.mean(left**2))),
+    )
+
+
+def stable_markers(markers: FloatArray) -> IntArray:
+    """Markers whose distances to each other change least over the take.
+
+    Starts with all and drops, one after the other, the one whose distances to the rest change
+    most (sum of squares; half the range that holds 90 % of the frames, so that a few bad frames
+    do not count), until `SHARE` of the markers are left.
+
+    Parameters
+    ----------
+    markers : array, shape (T, M, 3)
+        NaN: not observed.
+
+    Returns
+    -------
+    array of int, shape (S,)
+        In rising order.
+
+    Raises
+    ------
+    InputError
+        When fewer than three markers were ever seen.
+    """
+    kept = [int(index) for index in np.flatnonzero(~np.isnan(markers[:, :, 0]).all(axis=0))]
+    if len(kept) < 3:
+        raise InputError(
+            "/source/markers", "three markers or more", f"{len(kept)}", "Check the export."
+        )
+    change = _distance_change(markers) ** 2
+    most = max(FEWEST, math.ceil(SHARE * len(kept)))
+    while len(kept) > most:
+        kept.pop(int(change[np.ix_(kept, kept)].sum(axis=1).argmax()))
+    return np.array(kept, dtype=np.int64)
+
+
+def _distance_change(markers: FloatArray) -> FloatArray:
+    """How much the distance of each pair changes, (M, M); much for pairs never seen together."""
+    frames, count = markers.shape[:2]
+    some = int(np.clip(PAIRS_AT_ONCE // count**2, FEWEST_FRAMES, MOST_FRAMES))
+    few = markers[np.linspace(0, frames - 1, min(some, frames)).round().astype(np.int64)]
+    first, second = np.triu_indices(count, 1)
+    distance = np.linalg.norm(few[:, first] - few[:, second], axis=2)
+    together = ~np.isnan(distance).all(axis=0)
+    spread = np.full(len(first), np.nanmax(distance))
+    low, high = np.nanquantile(distance[:, together], [0.05, 0.95], axis=0)
+    spread[together] = (high - low) / 2.0
+    change = np.zeros((count, count))
+    change[first, second] = change[second, first] = spread
+    return change
+
+
+def _markers(source: Source) -> FloatArray:
+    if source.kind != "markers":
+        raise InputError(
+            "/source", "markers", "weights", "Weights have no head motion: use the take as it is."
+        )
+    return source.values
+
+
+def _chosen(source: Source, stable: Sequence[str] | Literal["automatic"]) -> IntArray:
+    if stable == "automatic":
+        return stable_markers(source.values)
+    if len(stable) < 3:
+        raise InputError("--stable", "three markers or more", f"{len(stable)}", "Name more.")
+    chosen = match(stable, source.names, "--stable")
+    never = [name for name, i in zip(stable, chosen, strict=True) if not source.valid[:, i].any()]
+    if never:
+        raise InputError(
+            "--stable", "markers that were seen", f"{never[0]!r}, which never was", "Leave it out."
+        )
+    return np.asarray(chosen)
+
+
+def _mean_shape(points: FloatArray) -> FloatArray:
+    """A first guess of the rigid shape (S, 3): frames aligned to the one that shows most.
+
+    A marker that this frame hides gets its place from the frames aligned without it.
+    """
+    seen = ~np.isnan(points[:, :, 0])
+    first = points[seen.sum(axis=1).argmax()]
+    shown = ~np.isnan(first[:, 0])
+    enough = determined(first[shown], seen[:, shown])
+    _require_known(enough)
+    aligned = align(first[shown], points[enough][:, shown], seen[enough][:, shown] * 1.0)
+    everywhere = aligned.undo(points[enough])
+    lost = np.isnan(everywhere[:, :, 0]).all(axis=0)
+    if lost.any():
+        raise InputError(
+            "--stable",
+            "stable markers that are seen together",
+            "some that never are",
+            "Choose others.",
+        )
+    return np.asarray(np.nanmedian(everywhere, axis=0))
+
+
+def _rigid(
+    shape: FloatArray, points: FloatArray, known: BoolArray
+) -> tuple[FloatArray, RigidMotion]:
+    """Shape and motion of points that are rigid but for skin, noise and strays."""
+    seen = (~np.isnan(points[:, :, 0])).astype(np.float64)
+    motion = align(shape, points, seen)
+    for _ in range(SHAPES):
+        for _ in range(REWEIGHTED):
+            away = np.linalg.norm(motion.undo(points) - shape, axis=2)
+            ordinary = np.nanquantile(away[known], ORDINARY) + np.finfo(float).tiny
+            weights = seen / (1.0 + np.nan_to_num(away / (STRAY * ordinary)) ** 2) ** 2
+            motion = align(shape, points, weights)
+        shape = np.nanmedian(motion.undo(points)[known], axis=0)
+    return shape, align(shape, points, weights)
+
+
+def _pose(motion: RigidMotion, known: BoolArray, reference: int | Literal["mean"]) -> RigidMotion:
+    """The one pose that all frames are brought to."""
+    if reference == "mean":
+        return mean_motion(RigidMotion(motion.rotations[known], motion.translations[known]))
+    if not 0 <= reference < len(motion) or not known[reference]:
+        inside = 0 <= reference < len(motion)
+        found = f"frame {reference}" + (", which shows too few" if inside else "")
+        expected = f"a frame from 0 to {len(motion) - 1} that shows three stable markers"
+        raise InputError("--reference", expected, found, "Choose another frame, or mean.")
+    return motion.at(reference)
+
+
+def _require_known(known: BoolArray) -> None:
+    if not known.any():
+        raise InputError(
+            "--stable",
+            "three stable markers, not on a line, in some frame",
+            "fewer in every frame",
+            "Choose other markers.",
+        )

@@ -1,0 +1,96 @@
+"""``facert stabilise``: markers without the head's motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from facert.cli import console
+from facert.errors import InputError, OutputExistsError, reading
+
+if TYPE_CHECKING:
+    from facert.cleaning.stabilisation import Stabilised
+    from facert.data import FloatArray
+
+
+def command(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Take with head motion.")],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Result: .h5, with the motion, or .csv.")
+    ],
+    stable: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,NAME,...|automatic",
+            help="Markers that hardly move against the skull, three at least; or find those "
+            "whose distances to each other change least.",
+        ),
+    ] = "automatic",
+    reference: Annotated[
+        str,
+        typer.Option(metavar="FRAME|mean", help="Frame whose head pose all get, counted from 0."),
+    ] = "mean",
+    no_detect: Annotated[
+        bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
+    ] = False,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+) -> None:
+    """Remove the head's rigid motion from markers.
+
+    Frozen, swapped and otherwise bad markers are taken as not observed. Frames that show fewer
+    than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
+    as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
+    """
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+    from facert.cleaning.stabilisation import stabilise
+    from facert.cli.cleaned_take import read_observed, write_beside
+
+    frame = _frame(reference)
+    take = read_observed(source, target, no_detect)
+    with reading(source):
+        found = stabilise(take, _names(stable), frame)
+    if found.interpolated.any():
+        console.log.warning(
+            "%d frames show fewer than three stable markers: head motion interpolated",
+            found.interpolated.sum(),
+        )
+    write_beside(found.take, output, overwrite, {"/source/head": found.head.matrices})
+    _print_removed(found, output)
+
+
+def _names(stable: str) -> list[str] | Literal["automatic"]:
+    if stable.strip() == "automatic":
+        return "automatic"
+    return [name.strip() for name in stable.split(",") if name.strip()]
+
+
+def _frame(reference: str) -> int | Literal["mean"]:
+    if reference == "mean":
+        return "mean"
+    if not reference.isdecimal():
+        raise InputError("--reference", "a frame or mean", repr(reference), "Give one of these.")
+    return int(reference)
+
+
+def _print_removed(found: Stabilised, output: Path) -> None:
+    unit = f" {found.take.units}" if found.take.units else ""
+    lines = (
+        f"wrote {output}",
+        f"removed rotation: {_size(found.head.degrees, ' degrees')}",
+        f"removed shift: {_size(found.shifts, unit)}",
+        f"stable markers: {', '.join(found.names)}",
+        f"motion left in them: {found.residual:.2g}{unit} RMS",
+    )
+    for line in lines:
+        console.out.print(line, markup=False)
+
+
+def _size(values: FloatArray, unit: str) -> str:
+    root = float((values**2).mean() ** 0.5)
+    return f"{root:.2f}{unit} RMS, {float(values.max()):.2f}{unit} at most"

@@ -1,0 +1,134 @@
+"""``facert suggest``: the frames of a take that are most worth posing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+
+if TYPE_CHECKING:
+    from facert.data import IntArray, Take
+    from facert.retargeter import Retargeter
+    from facert.suggestion.frames import Suggestion
+
+LABELS = "labels"
+
+
+def command(
+    take_path: Annotated[Path, typer.Argument(metavar="TAKE", help="What was recorded.")],
+    count: Annotated[int, typer.Option("-n", min=1, max=1000, help="How many frames.")] = 10,
+    have: Annotated[
+        str,
+        typer.Option(
+            metavar="labels|MODEL",
+            help="Go on from the take's posed frames, or from a model that is trained already.",
+        ),
+    ] = "",
+    seed: Annotated[
+        int, typer.Option(min=0, help="Which frames of a take of thousands are looked at.")
+    ] = 0,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="A contact sheet of the frames.")
+    ] = None,
+    rig_path: Annotated[
+        Path | None, typer.Option("--rig", help="The actor's rig, to draw tracked weights.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the sheet.")] = False,
+) -> None:
+    """Print the frames whose posing would help most, the most useful first.
+
+    Without --have poses are not looked at. Frames are numbered from 0.
+    """
+    import json
+
+    from facert.cli.pictures import require_picture_name, save_picture
+    from facert.errors import reading
+    from facert.io.formats import read_rig_file, read_take_file
+    from facert.suggestion.frames import suggest_frames
+    from facert.view.contact import contact_sheet
+    from facert.view.render import MAX_FRAMES
+
+    if rig_path is not None and sheet is None:
+        raise typer.BadParameter("--rig is for the sheet: give --sheet as well")
+    if sheet is not None:
+        require_picture_name(sheet, overwrite)
+        if count > MAX_FRAMES:
+            raise typer.BadParameter(f"a sheet shows at most {MAX_FRAMES} frames")
+    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
+    take = read_take_file(take_path, target)
+    with reading(take_path):
+        found = suggest_frames(take, count, _posed(take, have), seed)
+        rows = _rows(take, found)
+        if sheet is not None:
+            headings = [f"{row['frame']}   {_moment(row)}" for row in rows]
+            figure = contact_sheet(take, found.frames.tolist(), headings, rig)
+            save_picture(figure, sheet, overwrite)
+            console.log.info("%s: %d frames", sheet, len(rows))
+    if as_json:
+        typer.echo(json.dumps({"file": str(take_path), "frames": rows}, indent=2))
+    else:
+        _print(rows)
+
+
+def _posed(take: Take, have: str) -> Sequence[int] | IntArray | Retargeter:
+    """What the suggestion goes on from."""
+    if have != LABELS:
+        return _model(have) if have else ()
+    if not len(take.labels):
+        from facert.errors import InputError
+
+        raise InputError(
+            "/target/params", "posed frames, for --have labels", "none", "Leave --have out."
+        )
+    console.log.info("goes on from %d posed frames", len(take.labels))
+    return take.labels
+
+
+def _model(path: str) -> Retargeter:
+    from facert.retargeter import load
+
+    if not path.endswith(".safetensors"):
+        raise typer.BadParameter("--have takes the word labels, or a model (.safetensors)")
+    return load(path)
+
+
+def _rows(take: Take, found: Suggestion) -> list[dict[str, object]]:
+    """A line for each frame; without a timecode where the take has none."""
+    from facert.timecode import timecode
+
+    rows: list[dict[str, object]] = []
+    for frame, share in zip(found.frames.tolist(), found.shares.tolist(), strict=True):
+        seconds = float(take.time[frame])
+        code = timecode(take.start_timecode, seconds, take.fps)
+        row: dict[str, object] = {"frame": frame, "seconds": seconds}
+        rows.append(row | ({"timecode": code} if code else {}) | {"share": share})
+    return rows
+
+
+def _moment(row: dict[str, object]) -> str:
+    return str(row.get("timecode") or f"{row['seconds']:.2f} s")
+
+
+def _print(rows: Sequence[dict[str, object]]) -> None:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE)
+    for name in ("frame", "timecode" if "timecode" in rows[0] else "time", "stands for"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(str(row["frame"]), _moment(row), f"{row['share']:.1%}")
+    console.out.print(table)
+    in_time = sorted((str(row["frame"]) for row in rows), key=int)
+    console.out.print(f"in order of time: {','.join(in_time)}", markup=False)

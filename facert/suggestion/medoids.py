@@ -1,0 +1,107 @@
+"""k-medoids: the points that all others are near to.
+
+Of candidates j, choose a set C that minimises
+
+    Σ_i min(c_i, min_{j in C} d_ij),
+
+d_ij the distance of point i to candidate j, and c_i how near it is already to what was chosen
+before. One candidate after the other is added, each time the best; then they are exchanged, the
+best exchange first, until none helps. An exchange of s for j costs
+
+    Σ_i min(d1_i, d_ij)  +  Σ_{i nearest to s} [min(d2_i, d_ij) - min(d1_i, d_ij)],
+
+d1 and d2 the distances of i to the nearest and the second nearest of C: all exchanges together take
+no longer than a product of matrices (Schubert and Rousseeuw 2019, Faster k-Medoids Clustering).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data import BoolArray, FloatArray, IntArray
+
+MOST_EXCHANGES = 200
+LEAST_GAIN = 1e-6  # an exchange that gains less, relative to the sum, is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """What is chosen from.
+
+    Parameters
+    ----------
+    distances : array, shape (n, m)
+        Of n points to m candidates.
+    covered : array, shape (n,)
+        Distance of each point to what was chosen before; infinite if there is nothing.
+    rivals : array of bool, shape (m, m)
+        Candidates that are not to be chosen together; each is its own rival.
+    """
+
+    distances: FloatArray
+    covered: FloatArray
+    rivals: BoolArray
+
+    def weighted(self, weights: FloatArray) -> Choice:
+        """The same with points of different weights above 0, (n,)."""
+        return Choice(self.distances * weights[:, None], self.covered * weights, self.rivals)
+
+    def medoids(self, count: int) -> IntArray:
+        """So many candidates, rivals only where there is nothing else, (count,).
+
+        The most useful first: the first alone serves best, the second best beside it.
+        """
+        chosen = self._added(np.empty(0, dtype=np.int64), np.arange(len(self.rivals)), count)
+        for _ in range(MOST_EXCHANGES):
+            costs = self.exchange_costs(chosen)
+            slot, candidate = np.unravel_index(costs.argmin(), costs.shape)
+            if not costs[slot, candidate] < (1.0 - LEAST_GAIN) * self.cost(chosen):
+                break
+            chosen[slot] = candidate
+        return self.ranked(chosen)
+
+    def cost(self, chosen: IntArray) -> float:
+        """The sum that is minimised."""
+        return float(np.minimum(self.distances[:, chosen].min(axis=1), self.covered).sum())
+
+    def exchange_costs(self, chosen: IntArray) -> FloatArray:
+        """What the sum becomes with one of the chosen (k,) exchanged, (k, m); infinite for rivals.
+
+        Leaving a chosen one where it is counts as an exchange too.
+        """
+        near = np.column_stack([self.distances[:, chosen], self.covered])
+        owner, first, second = _two_nearest(near)
+        kept = np.minimum(self.distances, first[:, None])
+        lost = np.minimum(self.distances, second[:, None]) - kept
+        owned = (owner[:, None] == np.arange(len(chosen))).astype(np.float64)
+        costs: FloatArray = kept.sum(axis=0) + owned.T @ lost
+        rivals = self.rivals[chosen]
+        costs[rivals.sum(axis=0) - rivals > 0] = np.inf
+        return costs
+
+    def ranked(self, chosen: IntArray) -> IntArray:
+        """The same, the most useful first."""
+        return self._added(np.empty(0, dtype=np.int64), chosen, len(chosen))
+
+    def _added(self, chosen: IntArray, among: IntArray, count: int) -> IntArray:
+        """Some chosen and `count` more, each the best beside those before."""
+        best = self.covered
+        for _ in range(count):
+            costs = np.minimum(self.distances[:, among], best[:, None]).sum(axis=0)
+            taken = self.rivals[np.ix_(chosen, among)].any(axis=0)
+            if taken.all():
+                taken = np.isin(among, chosen)
+            added = among[np.where(taken, np.inf, costs).argmin()]
+            chosen = np.append(chosen, added)
+            best = np.minimum(best, self.distances[:, added])
+        return chosen
+
+
+def _two_nearest(near: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Which column is least in each row, its value, and the value of the next."""
+    order = np.argpartition(near, 1, axis=1)[:, :2]
+    pair = np.take_along_axis(near, order, axis=1)
+    swapped = pair[:, 0] > pair[:, 1]
+    return np.where(swapped, order[:, 1], order[:, 0]), pair.min(axis=1), pair.max(axis=1)

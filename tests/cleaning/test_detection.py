@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+
+from facert.cleaning.detection import exchanged, find_faults, held_values, single_spikes
+from facert.data import Source
+from facert.io.formats import read_take_file
+
+
+def source(markers):
+    return Source(markers, [f"m{i}" for i in range(markers.shape[1])])
+
+
+def at(shape, *places):
+    mask = np.zeros(shape[:2], dtype=bool)
+    for frames, marker in places:
+        mask[frames, marker] = True
+    return mask
+
+
+def test_a_clean_take_has_no_faults(face, head):
+    for markers in (face, head.apply(face), np.round(face, 2)):
+        assert str(find_faults(source(markers))) == "none"
+
+
+def test_gaps_and_noise_are_no_faults(face):
+    rng = np.random.default_rng(0)
+    noisy = face + 0.05 * rng.normal(size=face.shape)
+    noisy[rng.random(face.shape[:2]) < 0.3] = np.nan
+    assert find_faults(source(noisy)).any.mean() < 1e-3
+
+
+def test_the_origin_is_no_place_for_a_marker(face):
+    markers = face.copy()
+    markers[10:20, 3] = 0.0
+    markers[5, 4, 0] = 0.0  # one coordinate may be
+    np.testing.assert_array_equal(
+        find_faults(source(markers)).zero, at(face.shape, (slice(10, 20), 3))
+    )
+
+
+def test_a_held_value_is_frozen_but_for_its_first_frame(face):
+    markers = face.copy()
+    markers[100:131, 12] = markers[100, 12]
+    markers[380:, 15] = markers[380, 15]
+    expected = at(face.shape, (slice(101, 131), 12), (slice(381, 400), 15))
+    np.testing.assert_array_equal(find_faults(source(markers)).frozen, expected)
+
+
+def test_doubled_frames_and_rests_are_not_frozen(face):
+    doubled = np.repeat(face[::2], 2, axis=0)
+    assert not held_values(doubled).any()
+    resting = face.copy()
+    resting[100:131, 12] = face[100, 12]
+    resting[131:, 12] += face[100, 12] - face[131, 12] + 1e-4  # goes on from where it was
+    assert not held_values(resting).any()
+    assert not held_values(np.repeat(face[:1], 50, axis=0)).any()
+
+
+@pytest.mark.parametrize("frames", [slice(50, 51), slice(50, 120), slice(0, 30), slice(370, 400)])
+def test_markers_in_each_others_place_are_swapped(face, head, frames):
+    markers = head.apply(face)
+    markers[frames, [9, 14]] = markers[frames, [14, 9]]
+    expected = at(face.shape, (frames, 9), (frames, 14))
+    np.testing.assert_array_equal(find_faults(source(markers)).swapped, expected)
+
+
+def test_a_swap_across_a_gap_is_seen(face):
+    markers = face.copy()
+    markers[50:60, [9, 14]] = markers[50:60, [14, 9]]
+    markers[47:50, 9] = markers[60:62, 14] = np.nan
+    np.testing.assert_array_equal(
+        exchanged(markers), at(face.shape, (slice(50, 60), 9), (slice(50, 60), 14))
+    )
+
+
+def test_single_spikes_are_found_and_nothing_beside_them(face):
+    rng = np.random.default_rng(1)
+    hit = rng.random(face.shape[:2]) < 0.005
+    hit[1:] &= ~hit[:-1]
+    markers = face + 2.0 * hit[:, :, None] * rng.choice([-1.0, 1.0], face.shape)
+    found = single_spikes(markers)
+    assert (found & hit).sum() >= 0.95 * hit.sum()
+    assert (found & ~hit).sum() <= 2
+
+
+def test_a_fast_motion_of_many_and_a_lasting_odd_pose_are_no_spikes(face):
+    blink = face.copy()
+    factor = np.random.default_rng(2).normal(size=(12, 3))
+    for start in range(20, 400, 40):
+        blink[start : start + 2, 8:] += factor
+    assert not single_spikes(blink).any()
+    odd = face.copy()
+    odd[200:230, 15] += 3.0 * np.sin(np.linspace(0.0, np.pi, 30))[:, None] ** 2
+    assert not single_spikes(odd).any()
+
+
+def test_units_do_not_matter(face):
+    markers = face.copy()
+    markers[100:131, 12] = markers[100, 12]
+    markers[200, 10] += 3.0
+    np.testing.assert_array_equal(
+        find_faults(source(1e3 * markers)).any, find_faults(source(markers)).any
+    )
+
+
+def test_faults_are_counted_by_kind_and_hidden(face):
+    markers = face.copy()
+    markers[10:20, 3] = 0.0
+    markers[200, 10] += 3.0
+    faults = find_faults(source(markers))
+    assert str(faults) == "10 zero, 1 spiked"
+    hidden = faults.hidden_from(source(markers))
+    np.testing.assert_array_equal(~hidden.valid, faults.any)
+    np.testing.assert_array_equal(hidden.values[~faults.any], markers[~faults.any])
+
+
+def test_weights_rest_and_jump_as_they_like():
+    weights = Source(np.zeros((20, 2)) + (np.arange(20) > 9)[:, None], ["a", "b"])
+    faults = find_faults(weights)
+    assert not faults.any.any()
+    assert faults.hidden_from(weights) is weights
+
+
+def test_few_frames_or_markers_are_no_obstacle(face):
+    for markers in (face[:1], face[:2], face[:3], face[:, :1], face[:, :2]):
+        assert not find_faults(source(markers)).any.any()
+
+
+REAL = {
+    **{f"tracks/{name}": "arkit" for name in ("rom", "utterance_a", "utterance_b")},
+    **{f"tracks/optical_{name}": "solved" for name in ("cheeks", "eyebrows")},
+    "markers/cheeks": None,
+    "markers/eyebrows": None,
+}
+
+
+@pytest.mark.real
+@pytest.mark.parametrize(("name", "target"), REAL.items())
+def test_false_alarms_on_real_takes_are_below_one_in_a_thousand(real_data, name, target):
+    real = read_take_file(real_data / f"{name}.npz", target=target).source
+    assert find_faults(real).any.mean() < 1e-3
