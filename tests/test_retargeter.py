@@ -211,10 +211,13 @@ def test_limits_clip(take):
     assert (np.abs(result.params) == 0.1).any()
 
 
+@pytest.mark.parametrize("settings", [SHARED, QUICK])
 @pytest.mark.parametrize(("rule", "clipped"), [("auto", True), ("declared", False)])
-def test_without_declared_limits_poses_stay_within_those_that_were_seen(take, rule, clipped):
+def test_without_declared_limits_poses_stay_within_those_that_were_seen(
+    take, settings, rule, clipped
+):
     far = replace(take, source=take.source.with_matrix(1.5 * take.source.matrix))
-    result = facert.train(take, replace(SHARED, limits=rule)).retarget(far)
+    result = facert.train(take, replace(settings, limits=rule)).retarget(far)
     seen = np.vstack([take.params[take.labels], take.animation])
     inside = (result.params >= seen.min(axis=0)) & (result.params <= seen.max(axis=0))
     assert inside.all() == clipped
