@@ -117,6 +117,16 @@ class Retargeter:
             animation=None,
         )
 
+    def without_known(self, take: Take) -> Take:
+        """The take without the poses that this was trained on: what is left tells the error."""
+        if self.poses is None or take.params is None or take.controls is None:
+            return take
+        if set(take.controls.names) != set(self.controls.names):
+            return take
+        columns = [take.controls.names.index(name) for name in self.controls.names]
+        seen = (take.params[:, None, columns] == self.poses[None]).all(axis=2).any(axis=1)
+        return replace(take, params=np.where(seen[:, None], np.nan, take.params))
+
     def _predict(self, frames: FloatArray, mode: Mode) -> Prediction:
         if mode == "offline":
             return self.method.predict(frames)

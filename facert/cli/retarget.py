@@ -62,7 +62,10 @@ def command(
         "%d frames in %.2f s (%.3f ms a frame)", len(take), seconds, 1e3 * seconds / len(take)
     )
     console.out.print(f"wrote {output}", markup=False)
-    _print_errors(take, result)
+    unseen = retargeter.without_known(take)
+    _print_errors(unseen, result)
+    if len(take.labels) and not len(unseen.labels):
+        console.log.info("the poses in the input are those it was trained on: no error to tell")
 
 
 def _print_errors(truth: Take, result: Take) -> None:
@@ -77,7 +80,7 @@ def _print_errors(truth: Take, result: Take) -> None:
     if comparison is None:
         console.log.info("the poses in the input are of other controls: not compared")
         return
-    table = Table(title=f"RMS against the {comparison.frames} poses in the input")
+    table = Table(title=f"RMS against {comparison.frames} poses that it was not trained on")
     table.add_column("controls")
     table.add_column("number", justify="right")
     table.add_column("RMS", justify="right")

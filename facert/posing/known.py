@@ -50,8 +50,13 @@ class Given:
 
 
 def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> FloatArray:
-    """The poses that are kept of labels (l, P) and animation (n, P): `MOST`, drawn at random."""
-    poses = labelled if animation is None else np.vstack([labelled, animation])
-    if len(poses) <= MOST:
-        return poses
-    return poses[np.sort(np.random.default_rng(seed).permutation(len(poses))[:MOST])]
+    """The poses that are kept of labels (l, P) and animation (n, P): `MOST`, the labels first."""
+    rng = np.random.default_rng(seed)
+    labels = _some(labelled, MOST, rng)
+    if animation is None:
+        return labels
+    return np.vstack([labels, _some(animation, MOST - len(labels), rng)])
+
+
+def _some(poses: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
+    return poses[np.sort(rng.permutation(len(poses))[:count])]

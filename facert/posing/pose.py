@@ -197,7 +197,7 @@ def _warn_of_range(controls: Controls, known: KnownPoses, given: Given) -> None:
         if high[index] - low[index] <= BEYOND * max(abs(low[index]), 1.0):
             log.warning("%s never moves in the known poses: it tells nothing of the others", name)
         elif not low[index] - slack <= value <= high[index] + slack:
-            log.warning("%s is %g to %g in the known poses", name, low[index], high[index])
+            log.warning("%s is %.3g to %.3g in the known poses", name, low[index], high[index])
 
 
 def _warn_if_far(completion: Completion, given: Given) -> None:

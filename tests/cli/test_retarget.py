@@ -43,12 +43,22 @@ def test_the_result_holds_poses_their_std_and_the_cleaned_source(facert, files, 
     np.testing.assert_allclose(result.source.values, expected.source.values, atol=1e-10)
 
 
-def test_where_the_truth_is_known_errors_are_told_by_part_of_the_face(facert, files):
+def test_where_the_truth_is_known_errors_are_told_by_part_of_the_face(facert, files, trained):
     take, out, model = files
     done = facert("retarget", take, out, "--model", model)
-    assert "RMS against the 60 poses" in done.out
+    params = api.read_take(take).params
+    known = sum((pose == params).all(axis=1).any() for pose in trained.poses)
+    assert known
+    assert f"RMS against {60 - known} poses that it was not" in " ".join(done.out.split())
     for word in ("jaw", "mouth", "brows", "cheeks", "all"):
         assert word in done.out
+
+
+def test_poses_that_it_was_trained_on_tell_no_error(facert, files, make_take):
+    take, out, model = files
+    api.write_take(arkit(make_take()), take, overwrite=True)
+    done = facert("retarget", take, out, "--model", model)
+    assert "RMS" not in done.out
 
 
 def test_without_truth_or_with_that_of_another_character_there_is_no_table(

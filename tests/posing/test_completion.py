@@ -184,4 +184,5 @@ def test_at_most_so_many_poses_are_kept():
     assert kept.shape == (MOST, 7)
     assert (kept == keep(labels, animation, seed=0)).all()
     assert (keep(labels, sheet(30, seed=2), seed=0)[:20] == labels).all()
-    assert keep(labels, None, seed=0) is labels
+    assert (keep(labels, None, seed=0) == labels).all()
+    assert (keep(labels, animation, seed=0)[: len(labels)] == labels).all()
