@@ -69,16 +69,17 @@ def command(
     take = read_take_file(take_path, target)
     with reading(take_path):
         found = suggest_frames(take, count, _posed(take, have), seed)
-        rows = _rows(take, found)
-        if sheet is not None:
-            headings = [f"{row['frame']}   {_moment(row)}" for row in rows]
-            figure = contact_sheet(take, found.frames.tolist(), headings, rig)
-            save_picture(figure, sheet, overwrite)
-            console.log.info("%s: %d frames", sheet, len(rows))
+    rows = _rows(take, found)
     if as_json:
         typer.echo(json.dumps({"file": str(take_path), "frames": rows}, indent=2))
     else:
         _print(rows)
+    if sheet is not None:
+        with reading(take_path):
+            headings = [f"{row['frame']}   {_moment(row)}" for row in rows]
+            figure = contact_sheet(take, found.frames.tolist(), headings, rig)
+        save_picture(figure, sheet, overwrite)
+        console.log.info("%s: %d frames", sheet, len(rows))
 
 
 def _posed(take: Take, have: str) -> Sequence[int] | IntArray | Retargeter:

@@ -11,6 +11,7 @@ from facert.evaluation.cells import Outcome
 from facert.evaluation.comparison import Estimate, errors_by_method
 
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
+FIRM = 5  # draws from which on advice can stand alone
 RECENT = 3  # numbers of labels that the gain of more is judged by
 
 
@@ -33,7 +34,8 @@ def advise(outcomes: Sequence[Outcome]) -> str:
     chosen = ranked[0]
     equals = [other for other in ranked[1:] if _ties(logs[other] - logs[chosen])]
     as_good = f" ({' and '.join(equals)} within one standard error of it)" if equals else ""
-    return f"Use {chosen} for this take{as_good}. {_about_labels(labels, errors[chosen])}"
+    advice = f"Use {chosen} for this take{as_good}. {_about_labels(labels, errors[chosen])}"
+    return advice if errors[chosen].shape[1] >= FIRM else f"{advice} Draws are few: see --repeats."
 
 
 def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:

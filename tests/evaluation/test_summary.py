@@ -60,7 +60,13 @@ def test_advice_names_the_best_method_and_what_more_labels_bring():
         table({"a": {10: [0.20, 0.22], 20: [0.10, 0.11]}, "b": {10: [0.3, 0.3], 20: [0.2, 0.2]}})
     )
     assert line.startswith("Use a for this take. RMS 0.21 with 10 labels, 0.105 with 20")
-    assert line.endswith("40 labels would take off another 50%.")
+    assert "40 labels would take off another 50%." in line
+
+
+def test_advice_from_few_draws_says_so():
+    few, many = (advise(table({"a": {10: [0.2] * draws}})) for draws in (4, 5))
+    assert few.endswith("Draws are few: see --repeats.")
+    assert "few" not in many
 
 
 def test_advice_tells_what_does_as_well():
