@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 # Before NumPy is loaded: on small problems several threads only get in each other's way.
@@ -61,3 +62,16 @@ def _walk(time: np.ndarray) -> np.ndarray:
     """A walk in the plane with its products, (T, 5): what it moves, it moves nonlinearly."""
     a, b = np.sin(5.0 * time), np.cos(3.1 * time + 0.5)
     return np.stack([a, b, a * b, a * a, b * b], axis=1)
+
+
+@pytest.fixture(scope="session")
+def pose_few() -> Callable[[Take, int], Take]:
+    """Makes the same take with so many of its poses, at random."""
+
+    def make(truth: Take, count: int) -> Take:
+        params = np.full_like(truth.params, np.nan)
+        labels = np.random.default_rng(0).permutation(len(truth))[:count]
+        params[labels] = truth.params[labels]
+        return replace(truth, params=params)
+
+    return make

@@ -26,12 +26,9 @@ def truth(make_take):
 
 
 @pytest.fixture(scope="module")
-def take(truth):
+def take(truth, pose_few):
     """The same with 12 poses."""
-    params = np.full_like(truth.params, np.nan)
-    labels = np.random.default_rng(0).permutation(90)[:12]
-    params[labels] = truth.params[labels]
-    return replace(truth, params=params)
+    return pose_few(truth, 12)
 
 
 @pytest.fixture(scope="module")

@@ -63,9 +63,10 @@ def command(
     )
     console.out.print(f"wrote {output}", markup=False)
     unseen = retargeter.without_known(take)
-    _print_errors(unseen, result)
     if len(take.labels) and not len(unseen.labels):
         console.log.info("the poses in the input are those it was trained on: no error to tell")
+    else:
+        _print_errors(unseen, result)
 
 
 def _print_errors(truth: Take, result: Take) -> None:

@@ -59,6 +59,8 @@ def test_poses_that_it_was_trained_on_tell_no_error(facert, files, make_take):
     api.write_take(arkit(make_take()), take, overwrite=True)
     done = facert("retarget", take, out, "--model", model)
     assert "RMS" not in done.out
+    assert "those it was trained on" in done.err
+    assert "other controls" not in done.err
 
 
 def test_without_truth_or_with_that_of_another_character_there_is_no_table(

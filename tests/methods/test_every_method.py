@@ -40,12 +40,9 @@ def truth(make_take):
 
 
 @pytest.fixture(scope="module")
-def take(truth):
+def take(truth, pose_few):
     """The same with 14 poses."""
-    params = np.full_like(truth.params, np.nan)
-    labels = np.random.default_rng(0).permutation(90)[:14]
-    params[labels] = truth.params[labels]
-    return replace(truth, params=params)
+    return pose_few(truth, 14)
 
 
 @pytest.fixture(scope="module")
