@@ -64,7 +64,18 @@ class Dense(Interpolant):
         return np.asarray(found.reshape(-1, *labels.shape[1:]))
 
 
-class Elimination(Interpolant):
+class _Solved(Interpolant):
+    """An interpolant that solves a system for whatever labels it is given."""
+
+    _labelled: IntArray
+
+    @cached_property
+    def influence(self) -> FloatArray:
+        """A, (N, M): the solution for labels that are 1 at one point and 0 at the others."""
+        return self(np.eye(len(self._labelled)))
+
+
+class Elimination(_Solved):
     """Labels met exactly: β → ∞ in (17), where B₂₂ Y₂ = -B₁₂ᵀ Ŷ is left of (18).
 
     Parameters
@@ -87,11 +98,6 @@ class Elimination(Interpolant):
         self._B12 = columns[labelled]
         self._solver = _Factor(columns[self._free], self._free) if len(self._free) else None
 
-    @cached_property
-    def influence(self) -> FloatArray:
-        """A, (N, M): the solution for labels that are 1 at one point and 0 at the others."""
-        return self(np.eye(len(self._labelled)))
-
     def __call__(self, labels: FloatArray) -> FloatArray:
         """Y = [Ŷ, -B₂₂⁻¹ B₁₂ᵀ Ŷ] in the order of the points."""
         flat = labels.reshape(len(labels), -1)
@@ -111,7 +117,7 @@ class Elimination(Interpolant):
         return response
 
 
-class Weighted(Interpolant):
+class Weighted(_Solved):
     """Labels met as well as the weight β asks: (18) as it is written.
 
     Parameters
@@ -137,11 +143,6 @@ class Weighted(Interpolant):
         weights[labelled] = beta
         self._points = B.shape[0]
         self._solver = _Factor(B + sparse.diags_array(weights), np.arange(B.shape[0]))
-
-    @cached_property
-    def influence(self) -> FloatArray:
-        """A, (N, M): the solution for labels that are 1 at one point and 0 at the others."""
-        return self(np.eye(len(self._labelled)))
 
     def __call__(self, labels: FloatArray) -> FloatArray:
         """Y of (19)."""
