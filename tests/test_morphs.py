@@ -56,6 +56,13 @@ def test_a_larger_tolerance_needs_fewer_targets() -> None:
     assert counts[0] > counts[-1]
 
 
+def test_a_blink_in_a_single_frame_is_kept() -> None:
+    moved = motion_of_rank(12, 300)
+    moved[7, 3] += [0.0, 0.5 * farthest(moved), 0.0]
+    morphs = compact_morphs(sequence_of(moved), 0.05)
+    assert farthest((played(morphs) - MESH.vertices - moved)[7, 3]) <= 0.05 * farthest(moved)
+
+
 def test_weights_run_to_one() -> None:
     morphs = compact_morphs(sequence_of(motion_of_rank(6, 50)))
     np.testing.assert_allclose(morphs.weights.max(axis=0), 1)

@@ -22,11 +22,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.topology.characters import IDENTITIES, affine_map, ict, ict_landmarks, makehuman
-from experiments.topology.recordings import OPTICAL, RECORDINGS, segments, weights_of
+from experiments.topology.recordings import (
+    OPTICAL,
+    RECORDINGS,
+    SEGMENT,
+    expressive_frames,
+    segments,
+    weights_of,
+)
 from experiments.tracks import DATA, read_track
 from facert.data import FloatArray, IntArray
 
 EACH = 10
+RAMPS = 50
 # Markers that sit on one of the usual 68 landmarks.
 ANCHORS = {
     "NoseTop": 27, "NoseHead": 30, "Reye_Outside": 36, "Reye_Inside": 39, "Leye_Inside": 42,
@@ -57,6 +65,30 @@ def make_pairs(seed: int = 0) -> list[Pair]:
             parts = segments(recording, target, count, rng)
             pairs += [Pair(kind, *make(recording, part, rng)) for part in parts]
     return pairs
+
+
+def make_ramps(seed: int = 0) -> list[Pair]:
+    """Fifty smooth rises to a recorded expression and back, a third of the frames still.
+
+    The target is another identity whose controls answer late or early.
+    """
+    rng = np.random.default_rng(seed)
+    pairs = []
+    for number in range(RAMPS):
+        recording = RECORDINGS[number % len(RECORDINGS)]
+        expression, names = expressive_frames(recording, "arkit", 1, rng)
+        power = 2.0 ** rng.uniform(-1, 1, len(names))
+        weights = np.clip(expression, 0, None) * _rise()[:, None]
+        source, target = _actor(weights, names, rng), _actor(weights**power, names, rng)
+        pairs.append(Pair("ramps", source, target))
+    return pairs
+
+
+def _rise() -> FloatArray:
+    """From 0 to 1 and back, still at the beginning, in the middle and at the end, (100,)."""
+    frames, level = np.arange(SEGMENT), (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+    linear = np.interp(frames, (0, 11, 45, 55, 88, 99), level)
+    return np.asarray(linear**2 * (3.0 - 2.0 * linear))
 
 
 Points = tuple[FloatArray, FloatArray]

@@ -7,6 +7,7 @@ count alike: 1 is a still face.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import METHODS, propagate
 
 DEFAULT = next(iter(METHODS))
-OWN = tuple(name for name in ("residual", "path", "framework", "ridge") if name in METHODS)
+OWN = ("residual", "path", "framework", "literal", "ridge")
 KEYS = (2, 4, 6, 8, 10, 12, 15, 20)
 USUAL = 10
 NOT_DRAWN = 3.0  # times the error of the best baseline
@@ -39,10 +40,12 @@ def frame_errors(pair: Pair, keys: int, method: str) -> FloatArray:
     return np.asarray(np.linalg.norm(wrong.reshape(len(wrong), -1), axis=1) / motion)
 
 
-def measure(pairs: list[Pair], keys: int) -> dict[str, FloatArray]:
-    """The errors of every method, (pairs, frames); one that needs more keys is left out."""
+def measure(
+    pairs: list[Pair], keys: int, methods: Iterable[str] = tuple(METHODS)
+) -> dict[str, FloatArray]:
+    """The errors of each method, (pairs, frames); one that needs more keys is left out."""
     errors = {}
-    for method in METHODS:
+    for method in methods:
         with suppress(InputError):
             errors[method] = np.stack([frame_errors(pair, keys, method) for pair in pairs])
     return errors

@@ -57,6 +57,15 @@ def command(
             "biharmonic, rbf-linear or rbf-thin-plate."
         ),
     ] = "smooth",
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=100.0,
+            help="For .glb: how far off a vertex may be, in percent of the largest displacement. "
+            "More makes fewer targets and a smaller file.",
+        ),
+    ] = 0.5,
     shapes: Annotated[
         str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
     ] = None,
@@ -87,7 +96,7 @@ def command(
     sequence = MeshSequence(
         mesh, take.time, lambda frames: driver.deform(points.positions[frames]), take.fps
     )
-    said = _write(sequence, output, overwrite)
+    said = _write(sequence, output, tolerance / 100.0, overwrite)
     console.out.print(
         f"{output}: {len(take)} frames of {len(mesh.vertices)} vertices, "
         f"driven by {len(points.vertices)} points{said}",
@@ -107,7 +116,7 @@ def _require_output(output: Path, overwrite: bool) -> None:
         raise OutputExistsError(output)
 
 
-def _write(sequence: MeshSequence, output: Path, overwrite: bool) -> str:
+def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bool) -> str:
     """Write in the format of the name's ending; what there is to say about it."""
     from facert.io.glb import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
@@ -116,7 +125,7 @@ def _write(sequence: MeshSequence, output: Path, overwrite: bool) -> str:
     if output.suffix.lower() != ".glb":
         write_mesh_sequence(sequence, output, overwrite)
         return ""
-    morphs = compact_morphs(sequence)
+    morphs = compact_morphs(sequence, tolerance)
     write_glb(morphs, output, overwrite)
     unit = f" {sequence.neutral.units}" if sequence.neutral.units else ""
     return f"; {len(morphs.names)} morph targets, off by {morphs.error:.2g}{unit} at most"

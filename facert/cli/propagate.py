@@ -35,8 +35,8 @@ def command(
     method: Annotated[
         str,
         typer.Option(
-            help="residual, path, framework (the paper's), laplacian, rbf-linear, "
-            "rbf-thin-plate, ridge, affine or spline."
+            help="residual, path, framework (the paper's), literal (as printed), laplacian, "
+            "rbf-linear, rbf-thin-plate, ridge, affine or spline."
         ),
     ] = "residual",
     window: Annotated[

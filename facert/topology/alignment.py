@@ -1,10 +1,11 @@
 """The alignment matrix B of Algorithm 1.
 
 Minimised over the affine map of each local structure, the objective (7) is the sum over i of
-‖Y_i W_i‖² (13), where W_i = I - G_i G_iᵀ takes off what G_i = [e/√k_i, g_1, ..., g_d] spans: the
-constant, and the tangent coordinates of the *source*. W_i is a projection, W_i W_iᵀ = W_i, so that
-the sum is trace(Y B Yᵀ) with B = Σ S_i W_i S_iᵀ (14), (15): sparse, positive semidefinite, without
-a unit, and with the constant vector in its null space.
+trace(Y_i W_i Y_iᵀ) (13), where W_i = I - G_i G_iᵀ takes off what G_i = [e/√k_i, g_1, ..., g_d]
+spans: the constant, and the tangent coordinates of the *source*. The sum is trace(Y B Yᵀ) with
+B = Σ S_i W_i S_iᵀ (14), (15): sparse, positive semidefinite, without a unit, and with the constant
+vector in its null space. W_i is a projection but for the directions that are hardly more than
+noise, which it takes off in part (`facert.topology.tangent`).
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from facert.data import FloatArray
 from facert.topology.neighbourhoods import Neighbourhoods
 from facert.topology.tangent import LocalStructures, local_structures
 
-GUARD = 1e-6
-"""Least share of the largest singular value that counts as a direction of a surface."""
+GUARD = 1e-8
+"""The share of the largest singular value at which a direction of a surface is half noise."""
 
 
 def alignment_matrix(
@@ -34,7 +35,7 @@ def alignment_matrix(
     dim : int
         d, the dimension of the tangent spaces. With d = D, affine maps of the source cost nothing.
     guard : float
-        Directions with less than this share of the largest singular value are noise.
+        At this share of the largest singular value, a direction is half noise.
 
     Raises
     ------
@@ -51,6 +52,7 @@ def alignment_matrix(
 
 
 def residual_projections(structures: LocalStructures) -> FloatArray:
-    """W_i = I - G_i G_iᵀ of each local structure (13), (n, k, k)."""
+    """W_i = I - G_i G_iᵀ of each local structure (13), each g as much as it counts, (n, k, k)."""
     g, k = structures.scores, structures.members.shape[1]
-    return np.asarray(np.eye(k) - 1.0 / k - g @ g.transpose(0, 2, 1))
+    counted = g * structures.shares[:, None, :]
+    return np.asarray(np.eye(k) - 1.0 / k - counted @ g.transpose(0, 2, 1))

@@ -4,10 +4,15 @@ The frames are the points, the source expression is X, the key poses are the lab
 around each frame its neighbourhood: within a window of time the target is an affine map of the
 source's tangent coordinates. As the paper advises, each feature point is solved for on its own.
 
-Two terms are added to it. A window that stands still says nothing of how its frames differ: a path
-Laplacian holds them together (`path`). And a window knows nothing of another, where the same
-expression may have been posed: a regression on the whole performance comes first, and the framework
-carries over what it leaves of the key poses (`residual`, the default).
+As in face driving, what is solved for are *displacements*, here from the source times the ratio s
+of target to source motion: the target is s X + Z with trace(Zᵀ B Z) least. Where a window has three
+clear directions this changes nothing, since affine maps cost nothing. Where it has fewer, (9) as it
+is written keeps the target still along the others (`literal`, kept for comparison).
+
+Two terms may be added. A path Laplacian holds still windows together (`path`). And since a window
+knows nothing of another, where the same expression may have been posed, a regression on the whole
+performance may come first, of which the framework carries over what it leaves of the key poses
+(`residual`, the default).
 """
 
 from __future__ import annotations
@@ -27,11 +32,11 @@ from facert.topology.keyed import KeyedPerformance
 from facert.topology.labels import needed_labels, require_enough_labels
 from facert.topology.laplacian import path_energy
 from facert.topology.neighbourhoods import temporal_windows
-from facert.topology.regression import affine_regression, local_ridge, scaled_points
+from facert.topology.regression import affine_regression, local_ridge, scaled_points, scaled_source
 from facert.topology.solution import Elimination
 
-STILL = 0.03
-"""Least share of a point's largest singular value, over all windows, that counts as motion."""
+STILL = 0.01
+"""At this share of a point's largest singular value, over all windows, motion is half noise."""
 PATH = 0.1  # λ of the path Laplacian
 
 
@@ -105,18 +110,28 @@ def propagate(
                 "--window, --dim", f"neither with {method}", "one of them", "Leave them out."
             )
         return chosen.run(take, Windows())
-    windows = Windows(width or chosen.windows.width, dim or chosen.windows.dim)
+    windows = Windows(
+        chosen.windows.width if width is None else width,
+        chosen.windows.dim if dim is None else dim,
+    )
     return chosen.run(take, windows)
 
 
 def framework(take: KeyedPerformance, windows: Windows) -> FloatArray:
-    """The paper's framework for each feature point, (T, G, C)."""
-    return _solve(take, take.explaining, windows, smoothness=0.0)
+    """The paper's framework for each feature point, on displacements, (T, G, C)."""
+    return _displaced(take, windows, smoothness=0.0)
 
 
 def framework_and_path(take: KeyedPerformance, windows: Windows) -> FloatArray:
     """The same with a path Laplacian, B + λ Lᵀ L, (T, G, C)."""
-    return _solve(take, take.explaining, windows, smoothness=PATH)
+    return _displaced(take, windows, smoothness=PATH)
+
+
+def literal(take: KeyedPerformance, windows: Windows) -> FloatArray:
+    """Equation (9) as it is written, on positions, (T, G, C)."""
+    needed = needed_labels(windows.dim, take.explaining.shape[2])
+    require_enough_labels(temporal_windows(len(take), windows.width), take.keys, needed)
+    return _solve(take, take.explaining, windows, smoothness=0.0)
 
 
 def framework_on_residual(take: KeyedPerformance, windows: Windows) -> FloatArray:
@@ -126,7 +141,15 @@ def framework_on_residual(take: KeyedPerformance, windows: Windows) -> FloatArra
     whole frames: one matrix, one factorisation.
     """
     guess = local_ridge(take)
-    return guess + _solve(take.less(guess), take.frames[None], windows, smoothness=PATH)
+    return guess + _solve(take.less(guess), take.frames[None], windows, smoothness=0.0)
+
+
+def _displaced(take: KeyedPerformance, windows: Windows, smoothness: float) -> FloatArray:
+    """The framework on what the scaled source leaves; parameters of a rig have no such source."""
+    if not take.by_point:
+        return _solve(take, take.explaining, windows, smoothness)
+    guess = scaled_source(take)
+    return guess + _solve(take.less(guess), take.explaining, windows, smoothness)
 
 
 def _solve(
@@ -134,8 +157,6 @@ def _solve(
 ) -> FloatArray:
     """The framework with sources (G, T, d), or one (1, T, d) for all, (T, G, C)."""
     neighbourhoods = temporal_windows(len(take), windows.width)
-    needed = 1 if smoothness else needed_labels(windows.dim, sources.shape[2])
-    require_enough_labels(neighbourhoods, take.keys, needed)
     steady = smoothness * path_energy(len(take))
     parts = np.array_split(take.labels, len(sources), axis=1)
     solved = [
@@ -185,7 +206,8 @@ METHODS = {
         Windows(9, 5),
     ),
     "path": PropagationMethod("the framework with a path Laplacian", framework_and_path, Windows()),
-    "framework": PropagationMethod("the paper's framework", framework, Windows()),
+    "framework": PropagationMethod("the paper's framework, on displacements", framework, Windows()),
+    "literal": PropagationMethod("equation (9) as it is written, on positions", literal, Windows()),
     "laplacian": PropagationMethod("Laplacian editing in time", lambda take, _: laplacian(take)),
     "rbf-linear": PropagationMethod(
         "radial basis functions |r|", lambda take, _: rbf(take, "linear")
@@ -194,7 +216,7 @@ METHODS = {
         "radial basis functions r² log r", lambda take, _: rbf(take, "thin_plate_spline")
     ),
     "ridge": PropagationMethod(
-        "ridge regression towards the scaled source", lambda take, _: local_ridge(take)
+        "kernel ridge regression towards the scaled source", lambda take, _: local_ridge(take)
     ),
     "affine": PropagationMethod(
         "affine regression on whole frames", lambda take, _: affine_regression(take)

@@ -1,15 +1,17 @@
 """Regression of the target on the source, from the key frames alone.
 
 A few keys say little about a map from all feature points to all feature points. What they leave
-open is decided by two beliefs: the target moves as the scaled source does, and a point follows
-those near it more than those far away. The map is a ridge regression in its dual form: with
-k_p(t, u) = Σ_q w_pq x_q(t)·x_q(u), where w_pq = exp(-|p - q| / h) + w₀ falls with the distance of
-the feature points at rest,
+open is decided by three beliefs: the target moves as the scaled source does, a point follows those
+near it more than those far away, and the map is nearly linear. It is a kernel ridge regression,
 
     y_p(t) = s x_p(t) + c + k_p(t, keys) (k_p(keys, keys) + λ)⁻¹ (Ŷ_p - s X_p - c),
 
-with c the mean over the keys, and averaged over several λ by how well each does when a key is left
-out.
+with c the mean over the keys and the kernel k_p = l_p + κ exp(-d_p² / 2 ℓ²) + τ k. Its linear part
+is l_p(t, u) = Σ_q w_pq x_q(t)·x_q(u), where w_pq = exp(-|p - q| / h) + w₀ falls with the distance
+of the feature points at rest, and d_p is the distance that belongs to it,
+d_p²(t, u) = l_p(t, t) + l_p(u, u) - 2 l_p(t, u). k is the covariance of a smooth path in time, with
+the weight τ that it deserves (`facert.topology.path`). The results for several λ and κ are averaged
+by how well each does when a key is left out.
 """
 
 from __future__ import annotations
@@ -19,25 +21,31 @@ from scipy.spatial.distance import cdist
 
 from facert.data import FloatArray
 from facert.topology.keyed import KeyedPerformance
+from facert.topology.path import SmoothPath, trust_in_path
 
 REACH = 0.3  # h, in units of the face's radius
-EVERYWHERE = 0.01  # w₀
-PENALTIES = (1e-2, 1e-3, 1e-4, 1e-5)  # λ, where the mean of k_p(t, t) over the keys is 1
-TRUST = 0.1  # in leave-one-out errors, a key: see _dual_weights
+EVERYWHERE = 0.003  # w₀
+PENALTIES = (1e-2, 1e-3, 1e-4, 1e-5)  # λ, where the mean of l_p(t, t) over the keys is 1
+CURVATURES = (0.03, 0.3)  # κ
+BATCH = 256  # frames: for bounded memory
+LENGTH = 2.0  # ℓ, where two keys are √2 apart
+TRUST = 0.1  # in leave-one-out errors, a key: see _trusts
+TRACE = 1e-12  # of the motion: see scaled_source
 LEAST = 1e-12  # of what a key may weigh in its own prediction
 RANK = 1e-5  # least share of the largest singular value that is no rounding, in an affine map
 
 
 def local_ridge(take: KeyedPerformance) -> FloatArray:
-    """Ridge regression towards the scaled source, (T, G, C).
+    """Kernel ridge regression towards the scaled source, (T, G, C).
 
     The parameters of a rig have no place and no source of their own: they follow all points alike,
     and are drawn towards their mean.
     """
     if not take.by_point:
-        return _dual_ridge(take, np.ones((1, take.source.shape[1])))
+        nothing = np.zeros((len(take), *take.labels.shape[1:]))
+        return _kernel_ridge(take, nothing, np.ones((1, take.source.shape[1])))
     guess = scaled_source(take)
-    return guess + _dual_ridge(take.less(guess), _nearness(take.source.mean(axis=0)))
+    return guess + _kernel_ridge(take, guess, _nearness(take.source.mean(axis=0)))
 
 
 def affine_regression(take: KeyedPerformance) -> FloatArray:
@@ -49,11 +57,22 @@ def affine_regression(take: KeyedPerformance) -> FloatArray:
 
 
 def scaled_source(take: KeyedPerformance) -> FloatArray:
-    """The source times s, the ratio of target to source motion over the keys, (T, M, 3)."""
-    source, target = _centred_keys(take)
-    motion = float(np.sum(source**2))
-    scale = float(np.sum(source * target)) / motion if motion > 0 else 0.0
-    return scale * take.source
+    """The source turned and scaled as the motion of the target asks, s x_p(t) R, (T, M, 3).
+
+    The rotation R and s ≥ 0 are best over all feature points and keys (Kabsch 1976, Umeyama 1991):
+    it does not matter which way is up in either.
+    """
+    source, target = (motion.reshape(-1, 3) for motion in _centred_keys(take))
+    power = float(np.sum(source**2))
+    if power == 0:
+        return np.zeros_like(take.source)
+    covariance = source.T @ target
+    # A trace of the identity decides where the motion does not.
+    U, _, Vt = np.linalg.svd(covariance + TRACE * np.linalg.norm(covariance) * np.eye(3))
+    U[:, 2] *= np.sign(np.linalg.det(U @ Vt))  # a rotation, never a mirror
+    rotation = U @ Vt
+    scale = float(np.sum(covariance * rotation)) / power
+    return np.asarray(scale * take.source @ rotation)
 
 
 def scaled_points(take: KeyedPerformance) -> FloatArray:
@@ -72,41 +91,111 @@ def _nearness(rest: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-distance / REACH) + EVERYWHERE)
 
 
-def _dual_ridge(take: KeyedPerformance, weights: FloatArray) -> FloatArray:
-    """The regression with weights w_pq (G, M), the mean of the keys taken off, (T, G, C)."""
-    keys = take.keys
-    centred = take.source - take.source[keys].mean(axis=0)
-    products = np.einsum("tqc,kqc->qtk", centred, centred[keys])
-    kernel = np.tensordot(weights, products, axes=1)  # (G, T, K)
-    size = np.trace(kernel[:, keys], axis1=1, axis2=2) / len(keys)
-    kernel /= np.where(size > 0, size, 1.0)[:, None, None]
-    mean = take.labels.mean(axis=0)
-    targets = (take.labels - mean).transpose(1, 0, 2)
-    found = kernel @ _dual_weights(kernel[:, keys], targets)  # (G, T, C)
-    return np.asarray(found.transpose(1, 0, 2) + mean)
+def _kernel_ridge(take: KeyedPerformance, guess: FloatArray, weights: FloatArray) -> FloatArray:
+    """What a guess (T, G, C) leaves of the target, with weights w_pq (G, M), (T, G, C)."""
+    left = take.less(guess).labels
+    mean = left.mean(axis=0)
+    targets = (left - mean).transpose(1, 0, 2)
+    centred = take.source - take.source[take.keys].mean(axis=0)
+    kernels = _Kernels(centred[take.keys], weights)
+    path = _trusted_path(take, kernels.linear, targets)
+    fits = [_dual_weights(kernel, targets) for kernel in kernels(kernels.keys, path[take.keys])]
+    trusts = _trusts(np.array([errors for _, errors in fits]), len(take.keys))
+    alphas = [
+        np.tensordot(trust, alpha, axes=1) for trust, (alpha, _) in zip(trusts, fits, strict=True)
+    ]
+    found = np.empty((len(take), *mean.shape))
+    for start in range(0, len(take), BATCH):
+        rows = slice(start, start + BATCH)
+        batch = kernels(centred[rows], path[rows])
+        parts = [k @ alpha for k, alpha in zip(batch, alphas, strict=True)]
+        found[rows] = np.sum(parts, axis=0).transpose(1, 0, 2)
+    return np.asarray(found + mean)
 
 
-def _dual_weights(kernel: FloatArray, targets: FloatArray) -> FloatArray:
-    """α = (k + λ)⁻¹ Ŷ, (G, K, C), averaged over λ.
+def _trusted_path(take: KeyedPerformance, linear: FloatArray, targets: FloatArray) -> FloatArray:
+    """τ k of all frames with the keys, (T, K)."""
+    path = SmoothPath(len(take), take.keys)
+    motion = float(np.sum((take.labels - take.labels.mean(axis=0)) ** 2))
+    _, errors = _dual_weights(linear, targets)
+    by_map = float(np.sqrt(errors.min() / motion)) if motion > 0 else 0.0
+    return trust_in_path(path.missed(take), by_map) * path.covariance()
+
+
+class _Kernels:
+    """k_p between frames and the keys, without a mean over the keys, for every κ.
+
+    Parameters
+    ----------
+    keys : array, shape (K, M, 3)
+        Source frames, less their mean.
+    weights : array, shape (G, M)
+        w_pq.
+    """
+
+    def __init__(self, keys: FloatArray, weights: FloatArray) -> None:
+        self.keys, self._weights = keys, weights
+        self._own = self._powers(keys)
+        size = self._own.mean(axis=1)
+        self._size = np.where(size > 0, size, 1.0)[:, None, None]
+        self._mean = self._bell(keys, self._linear(keys)).mean(axis=1, keepdims=True)
+
+    @property
+    def linear(self) -> FloatArray:
+        """The linear part l_p alone between the keys, (G, K, K)."""
+        return self._linear(self.keys) / self._size
+
+    def __call__(self, frames: FloatArray, path: FloatArray) -> list[FloatArray]:
+        """The kernels (G, n, K) of frames (n, M, 3), τ k (n, K) among them, less the keys' mean."""
+        linear = self._linear(frames)
+        bell = self._bell(frames, linear) - self._mean
+        sure = linear / self._size + path
+        return [sure + curvature * bell for curvature in CURVATURES]
+
+    def _linear(self, frames: FloatArray) -> FloatArray:
+        """l_p, (G, n, K)."""
+        products = np.einsum("tqc,kqc->qtk", frames, self.keys)
+        return np.asarray(np.tensordot(self._weights, products, axes=1))
+
+    def _bell(self, frames: FloatArray, linear: FloatArray) -> FloatArray:
+        """The exponential of the distances, without a mean over the keys in each row, (G, n, K)."""
+        squared = self._powers(frames)[:, :, None] + self._own[:, None, :] - 2.0 * linear
+        bell = np.exp(-squared / (2.0 * LENGTH**2 * self._size))
+        return np.asarray(bell - bell.mean(axis=2, keepdims=True))
+
+    def _powers(self, frames: FloatArray) -> FloatArray:
+        """l_p(t, t), (G, n)."""
+        return np.asarray(self._weights @ np.einsum("tqc,tqc->qt", frames, frames))
+
+
+def _dual_weights(kernel: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """α = (k + λ)⁻¹ Ŷ for every λ, (L, G, K, C), and the leave-one-out error of each, (L,).
 
     Kernel (G, K, K) and targets (G, K, C) have no mean over the K keys, so that the constant is an
     eigenvector of the kernel for the eigenvalue 0. A key that is left out, of the mean as well, is
-    missed by α_i / (((k + λ)⁻¹)_ii - 1 / (K λ)). With few keys these errors E are a rough guess:
-    each λ has the weight E^(-K/10), which comes to a choice as the keys grow many.
+    missed by α_i / (((k + λ)⁻¹)_ii - 1 / (K λ)).
     """
     values, vectors = np.linalg.eigh(kernel)
     projected = vectors.transpose(0, 2, 1) @ targets
-    keys, found, errors = kernel.shape[1], [], []
+    keys, alphas, errors = kernel.shape[1], [], []
     for penalty in PENALTIES:
         inverse = 1.0 / (np.maximum(values, 0.0) + penalty)  # (G, K)
         alpha = vectors @ (inverse[:, :, None] * projected)
         own = np.sum(vectors**2 * inverse[:, None, :], axis=2) - 1.0 / (keys * penalty)
-        found.append(alpha)
+        alphas.append(alpha)
         errors.append(float(np.sum((alpha / np.maximum(own, LEAST)[:, :, None]) ** 2)))
-    least = min(errors)
-    relative = np.array(errors) / least if least > 0 else np.ones(len(errors))
-    weights = relative ** (-TRUST * keys)
-    return np.tensordot(weights / weights.sum(), np.array(found), axes=1)
+    return np.array(alphas), np.array(errors)
+
+
+def _trusts(errors: FloatArray, keys: int) -> FloatArray:
+    """Weights of regressions by their leave-one-out errors E, of the same shape, that sum to 1.
+
+    With few keys the errors are a rough guess: a regression has the weight E^(-K/10), which comes
+    to a choice as the keys grow many.
+    """
+    least = errors.min()
+    weights = (errors / least) ** (-TRUST * keys) if least > 0 else np.ones_like(errors)
+    return np.asarray(weights / weights.sum())
 
 
 def _centred_keys(take: KeyedPerformance) -> tuple[FloatArray, FloatArray]:

@@ -5,6 +5,9 @@ ends. Then, one after the other, the vertex that the framework misses most over 
 rig, guessing from the points so far. Lips, lids and brows come by themselves: they move most, and
 unlike what is around them.
 
+On a face whose halves are alike, a vertex comes with the one opposite to it, so that both sides
+are driven alike.
+
 A new point changes the guess by a multiple of one column of the Green's function, so that a partial
 Cholesky factorisation of it with these pivots is all that is needed: one sparse solution a point.
 """
@@ -13,12 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Rig
+from facert.data import BoolArray, FloatArray, IntArray, Rig
 from facert.errors import InputError
 from facert.topology.driving import smooth_energy
 from facert.topology.labels import checked_labels
 from facert.topology.neighbourhoods import mesh_rings
 from facert.topology.solution import Elimination
+from facert.topology.symmetry import mirror_vertices
 
 RIM = 0.1  # share of the points that are on the rim
 EVEN = 0.25  # power that evens out large and small shapes: 0 takes them as they are, 1 as equals
@@ -43,24 +47,47 @@ def suggest_points(rig: Rig, count: int) -> IntArray:
         raise InputError(
             "-n", f"{len(rim)} to {len(rig.neutral)}", f"{count}", "Choose another number."
         )
-    return np.concatenate([rim, _hardest(rig, rim, count - len(rim))])
+    return _hardest(rig, rim, count)
 
 
 def spread_vertices(rig: Rig, count: int) -> IntArray:
-    """One vertex of each connected part, then rim vertices far from each other, (n,)."""
-    components = mesh_rings(rig.faces, len(rig.neutral)).components
-    chosen = list(np.unique(components, return_index=True)[1])
-    rim = rim_vertices(rig.faces)
+    """A vertex of each connected part, then rim vertices far from each other, (n,).
+
+    Each with its opposite. They are `count`, or more if there are more parts.
+    """
+    rim, mirror = rim_vertices(rig.faces), mirror_vertices(rig.neutral)
     candidates = rim if len(rim) else np.arange(len(rig.neutral))
-    places = rig.neutral[candidates]
-    distance = np.full(len(candidates), np.inf)
-    for vertex in chosen:
-        distance = np.minimum(distance, np.linalg.norm(places - rig.neutral[vertex], axis=1))
-    while len(chosen) < count and distance.max() > 0:
-        farthest = int(distance.argmax())
-        chosen.append(candidates[farthest])
-        distance = np.minimum(distance, np.linalg.norm(places - places[farthest], axis=1))
+    distance = np.full(len(rig.neutral), np.inf)
+    chosen: list[int] = []
+
+    def choose(vertices: list[int]) -> None:
+        chosen.extend(vertices)
+        for vertex in vertices:
+            away = np.linalg.norm(rig.neutral - rig.neutral[vertex], axis=1)
+            np.minimum(distance, away, out=distance)
+
+    components = mesh_rings(rig.faces, len(rig.neutral)).components
+    middle_first = np.argsort(mirror != np.arange(len(mirror)), kind="stable")
+    for first in middle_first[np.unique(components[middle_first], return_index=True)[1]]:
+        if components[first] not in components[chosen]:
+            choose(_with_opposite(int(first), mirror))
+    while len(chosen) < count:
+        may = candidates[_fitting(mirror[candidates], candidates, count - len(chosen))]
+        if distance[may].max(initial=0.0) <= 0:
+            break
+        choose(_with_opposite(int(may[distance[may].argmax()]), mirror))
     return np.array(chosen, dtype=np.int64)
+
+
+def _with_opposite(vertex: int, mirror: IntArray) -> list[int]:
+    """A vertex and the one opposite to it; only one on the middle line."""
+    return list(dict.fromkeys([vertex, int(mirror[vertex])]))
+
+
+def _fitting(opposites: IntArray, vertices: IntArray, room: int) -> BoolArray:
+    """Which vertices fit, with their opposites, where so many may be chosen yet, (n,)."""
+    middle = opposites == vertices
+    return middle if room == 1 and middle.any() else np.full(len(vertices), True)
 
 
 def rim_vertices(faces: IntArray) -> IntArray:
@@ -71,22 +98,41 @@ def rim_vertices(faces: IntArray) -> IntArray:
 
 
 def _hardest(rig: Rig, given: IntArray, count: int) -> IntArray:
-    """The vertices that are missed most, each guessed from the given ones and those before."""
-    solution = Elimination(
-        smooth_energy(rig.neutral, rig.faces), checked_labels(given, len(rig.neutral))
-    )
-    shapes = _evened(rig.shapes)  # (V, 3 P)
-    missed = shapes - solution(shapes[given])
-    factor = np.zeros((len(missed), count))
-    chosen = np.zeros(count, dtype=np.int64)
-    taken = np.isin(np.arange(len(missed)), given)
-    for step in range(count):
-        pivot = np.where(taken, -1.0, np.sum(missed**2, axis=1)).argmax()
-        chosen[step], taken[pivot] = pivot, True
-        column = solution.green(int(pivot)) - factor @ factor[pivot]
-        missed -= np.outer(column / column[pivot], missed[pivot])
-        factor[:, step] = column / np.sqrt(column[pivot])
-    return chosen
+    """The given vertices, then those that are missed most, guessed from all before, (count,)."""
+    guess = _Guess(rig, given)
+    mirror, everywhere = mirror_vertices(rig.neutral), np.arange(len(rig.neutral))
+    chosen = list(given)
+    while len(chosen) < count:
+        fitting = _fitting(mirror, everywhere, count - len(chosen)) & ~np.isin(everywhere, chosen)
+        free = np.flatnonzero(fitting if fitting.any() else ~np.isin(everywhere, chosen))
+        pair = _with_opposite(int(free[guess.missed[free].argmax()]), mirror)
+        for vertex in pair[: count - len(chosen)]:
+            if vertex not in chosen:
+                guess.add(vertex)
+                chosen.append(vertex)
+    return np.array(chosen, dtype=np.int64)
+
+
+class _Guess:
+    """The shapes of a rig as the framework guesses them from some vertices, and what it misses."""
+
+    def __init__(self, rig: Rig, given: IntArray) -> None:
+        energy = smooth_energy(rig.neutral, rig.faces)
+        self._solution = Elimination(energy, checked_labels(given, len(rig.neutral)))
+        shapes = _evened(rig.shapes)
+        self._error = shapes - self._solution(shapes[given])  # (V, 3 P)
+        self._factor = np.zeros((len(shapes), 0))
+
+    @property
+    def missed(self) -> FloatArray:
+        """How much each vertex is missed, squared, (V,)."""
+        return np.asarray(np.einsum("vp,vp->v", self._error, self._error))
+
+    def add(self, vertex: int) -> None:
+        """Guess from this vertex too."""
+        column = self._solution.green(vertex) - self._factor @ self._factor[vertex]
+        self._error -= np.outer(column / column[vertex], self._error[vertex])
+        self._factor = np.column_stack([self._factor, column / np.sqrt(column[vertex])])
 
 
 def _evened(shapes: FloatArray) -> FloatArray:

@@ -6,13 +6,15 @@ U span the tangent space; the coordinates in it are x̃ = (x - x̄_i) U (1), of 
 x̃ Uᵀ + x̄_i (2). The columns of G are the same coordinates, each scaled to length 1: an affine map
 of the tangent coordinates (5) is a linear one of [e/√k, G].
 
-How many directions there are is decided against the largest singular value of *all* local
-structures: in a frame that stands still every direction is noise, and none is kept.
+How much a direction counts is decided against the largest singular value σ of *all* local
+structures: in a frame that stands still every direction is noise. With the penalty μ² ‖D_i‖² in
+(6), μ a share of σ, the pseudo-inverse of (12) is damped: the direction of singular value s counts
+s² / (s² + μ²). A threshold, which is the usual way, would make the result jump where s crosses it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +39,8 @@ class LocalStructures:
         Columns: g_1 to g_d of Algorithm 1, step 4.
     spread : array, shape (n, d)
         Singular values, falling.
+    shares : array, shape (n, d)
+        How much each direction counts, from 0 to 1.
     """
 
     members: IntArray
@@ -44,6 +48,7 @@ class LocalStructures:
     directions: FloatArray
     scores: FloatArray
     spread: FloatArray
+    shares: FloatArray
 
     @property
     def coordinates(self) -> FloatArray:
@@ -54,16 +59,11 @@ class LocalStructures:
         """Points (n, k, D) from tangent coordinates (n, k, d), equation (2)."""
         return coordinates @ self.directions + self.means[:, None, :]
 
-    def without(self, least: float) -> LocalStructures:
-        """The same, with zeros for directions whose singular value is at most `least`."""
-        kept = self.spread > least
-        return LocalStructures(
-            self.members,
-            self.means,
-            self.directions * kept[:, :, None],
-            self.scores * kept[:, None, :],
-            self.spread * kept,
-        )
+    def damped(self, noise: float) -> LocalStructures:
+        """The same, where a direction whose singular value is μ = `noise` counts one half."""
+        power = self.spread**2
+        shares = np.divide(power, power + noise**2, out=np.zeros_like(power), where=power > 0)
+        return replace(self, shares=shares)
 
 
 def local_structures(
@@ -79,7 +79,7 @@ def local_structures(
     dim : int
         d, the most directions of a tangent space; D and k - 1 bound it as well.
     guard : float
-        A direction counts when its singular value is above this share of the largest of all.
+        μ, as a share of the largest singular value of all.
 
     Raises
     ------
@@ -97,11 +97,18 @@ def local_structures(
         raise InputError("dim", "0 or more", f"{dim}", "2 suits a surface, 3 a moving point.")
     structures = [_tangent_spaces(X, members, dim) for members in neighbourhoods.by_size()]
     largest = max((float(each.spread.max(initial=0.0)) for each in structures), default=0.0)
-    return [each.without(guard * largest) for each in structures]
+    return [each.damped(guard * largest) for each in structures]
 
 
 def _tangent_spaces(X: FloatArray, members: IntArray, dim: int) -> LocalStructures:
     local = X[members]
     means = local.mean(axis=1)
     scores, spread, directions = np.linalg.svd(local - means[:, None, :], full_matrices=False)
-    return LocalStructures(members, means, directions[:, :dim], scores[:, :, :dim], spread[:, :dim])
+    return LocalStructures(
+        members,
+        means,
+        directions[:, :dim],
+        scores[:, :, :dim],
+        spread[:, :dim],
+        shares=np.ones_like(spread[:, :dim]),
+    )

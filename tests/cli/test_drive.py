@@ -89,6 +89,18 @@ def test_a_glb_holds_morph_targets(facert, files, tmp_path):
     assert (tmp_path / "out.glb").read_bytes()[:4] == b"glTF"
 
 
+def test_a_larger_tolerance_makes_a_smaller_glb(facert, files, tmp_path):
+    mesh, take, _ = files
+    sizes = []
+    for tolerance in (0.01, 30):
+        out = tmp_path / f"{tolerance}.glb"
+        done = facert("drive", mesh, take, out, "--tolerance", tolerance)
+        assert done.code == 0, done.err
+        sizes.append(out.stat().st_size)
+    assert sizes[1] < 0.7 * sizes[0]
+    assert facert("drive", mesh, take, tmp_path / "a.glb", "--tolerance", -1).code == 2
+
+
 def test_parts_without_a_point_are_refused_or_carried(facert, files, rig, tmp_path):
     _, take, _ = files
     far = rig.neutral + np.array([0.0, 0.0, 5.0])

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from facert.errors import InputError
 from facert.topology.alignment import alignment_matrix
-from facert.topology.neighbourhoods import mesh_rings, temporal_windows
+from facert.topology.neighbourhoods import given_lists, mesh_rings, temporal_windows
 from facert.topology.tangent import local_structures
 
 
@@ -76,11 +78,27 @@ def test_frames_that_stand_still_have_no_direction_but_noise():
     rng = np.random.default_rng(0)
     X = np.zeros((60, 3))
     X[40:] = rng.normal(size=(20, 3)).cumsum(axis=0)
-    X += 1e-4 * rng.normal(size=X.shape)
+    X += 1e-6 * rng.normal(size=X.shape)
     windows = temporal_windows(60, 5)
     guarded = alignment_matrix(X, windows, 3, guard=0.01)[:30, :30].toarray()
-    np.testing.assert_allclose(guarded, alignment_matrix(X, windows, 0)[:30, :30].toarray())
+    still = alignment_matrix(X, windows, 0)[:30, :30].toarray()
+    np.testing.assert_allclose(guarded, still, atol=1e-6)
     assert np.abs(alignment_matrix(X, windows, 3)[:30, :30].toarray() - guarded).max() > 0.1
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(1e-3, 1.0), st.integers(0, 99))
+def test_a_guard_is_a_penalty_on_the_local_maps(guard, seed):
+    """W of a single window is what (6) leaves of Y when D_i costs its square times μ²."""
+    rng = np.random.default_rng(seed)
+    X, Y = rng.normal(size=(7, 3)) * [1.0, 0.1, 0.01], rng.normal(size=(7, 2))
+    window = given_lists([range(7)], 7)
+    B = alignment_matrix(X, window, 3, guard).toarray()
+    x, y = X - X.mean(axis=0), Y - Y.mean(axis=0)
+    noise = guard * np.linalg.norm(x, 2)
+    D = np.linalg.solve(x.T @ x + noise**2 * np.eye(3), x.T @ y)
+    least = np.sum((y - x @ D) ** 2) + noise**2 * np.sum(D**2)
+    assert np.trace(Y.T @ B @ Y) == pytest.approx(least, rel=1e-9)
 
 
 def test_repeated_frames_do_no_harm():

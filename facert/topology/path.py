@@ -1,0 +1,90 @@
+"""What smoothness in time tells of the frames between the keys, and how far to trust it.
+
+The smoothest path through the key poses, ∫ ‖y''‖² dt = trace(Ŷᵀ S Ŷ) least, is Y = A Ŷ. As a belief
+about the target it is a Gaussian process, whose covariance between the keys is the pseudo-inverse
+S⁺, and A S⁺ between all frames and the keys.
+
+Whether the path can be trusted, the key poses do not say: to leave one out doubles the gap that the
+path must bridge. The source does, all frames of which are known. Where the path through its key
+frames misses little of it, as in a slow rise to an expression and back, time tells much of the
+target; in speech it tells nothing. And where the target follows the source linearly, the source
+tells all, and there is nothing left for time to tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from facert.data import FloatArray, IntArray
+from facert.topology.keyed import KeyedPerformance
+
+MOST = 30.0  # τ where time tells all
+BALANCE = 0.2  # times what a linear map misses: where time is trusted half as much
+STEEPNESS = 6
+RANK = 1e-13  # of the covariance: its null vector is the constant
+
+
+class SmoothPath:
+    """The smoothest path in time through any values of the key frames.
+
+    A cubic spline: of all curves that are at rest in the first and the last key, and before and
+    after, it has the least ∫ y''².
+
+    Parameters
+    ----------
+    frames : int
+        T.
+    keys : array of int, shape (K,)
+        Different frames, in any order.
+
+    Attributes
+    ----------
+    influence : array, shape (T, K)
+        A: the path is A Ŷ.
+    stiffness : array, shape (K, K)
+        S: its ∫ y''² is trace(Ŷᵀ S Ŷ).
+    """
+
+    def __init__(self, frames: int, keys: IntArray) -> None:
+        order = np.argsort(keys)
+        times = keys[order].astype(np.float64)
+        spline = CubicSpline(times, np.eye(len(keys))[order], bc_type="clamped")
+        self.influence: FloatArray = spline(np.clip(np.arange(frames), times[0], times[-1]))
+        bent = spline(times, 2)  # the second derivative, linear between the keys
+        before, after, gap = bent[:-1], bent[1:], np.diff(times)[:, None] / 6.0
+        product = before.T @ (gap * after)
+        ends = before.T @ (gap * before) + after.T @ (gap * after)
+        self.stiffness: FloatArray = 2.0 * ends + product + product.T
+
+    def covariance(self) -> FloatArray:
+        """Of all frames with the keys, (T, K), where no key differs from the mean of the keys.
+
+        Rows add up to 0, so do the rows of the keys, and the mean variance of the keys is 1.
+        """
+        centre = np.eye(len(self.stiffness)) - 1.0 / len(self.stiffness)
+        between_keys = centre @ np.linalg.pinv(self.stiffness, rcond=RANK, hermitian=True) @ centre
+        return np.asarray(self.influence @ between_keys / between_keys.diagonal().mean())
+
+    def missed(self, take: KeyedPerformance) -> float:
+        """ε: how far the path through the source's key frames is off, as a share of its motion."""
+        motion = float(np.linalg.norm(take.frames - take.frames.mean(axis=0)))
+        path = self.influence @ take.frames[take.keys]
+        return float(np.linalg.norm(path - take.frames)) / motion if motion > 0 else 0.0
+
+
+def trust_in_path(by_path: float, by_map: float) -> float:
+    """τ, the variance that the path is given, from 0 to 30.
+
+    Parameters
+    ----------
+    by_path : float
+        ε, what the path misses of the source.
+    by_map : float
+        δ, what a linear map from the source misses of a key that is left out. Both are shares of
+        the motion.
+    """
+    if by_map <= 0:
+        return 0.0
+    ratio = by_path / (BALANCE * by_map)
+    return float(MOST / (1.0 + ratio**STEEPNESS)) if ratio < 1.0 / RANK else 0.0

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+from facert.topology.keyed import KeyedPerformance
+from facert.topology.path import MOST, SmoothPath, trust_in_path
+from facert.topology.propagation import propagate
+
+KEYS = np.array([40, 3, 12, 55, 22])
+SHARES = st.floats(1e-3, 10.0)
+
+
+def values(columns=4):
+    return np.random.default_rng(0).normal(size=(len(KEYS), columns))
+
+
+def ramp(power, seed=0):
+    """A slow rise to an expression and back, still for a third of the time."""
+    rng = np.random.default_rng(seed)
+    level = np.interp(np.arange(100), (0, 11, 45, 55, 88, 99), (0.0, 0.0, 1.0, 1.0, 0.0, 0.0))
+    rise = level**2 * (3.0 - 2.0 * level)
+    rest, shapes = rng.normal(size=(2, 20, 3))
+    other = rng.normal(size=(20, 3))
+    source = 3.0 * rest + rise[:, None, None] * shapes
+    truth = 4.0 * rest + rise[:, None, None] * shapes + rise[:, None, None] ** power * other
+    keys = np.linspace(0, 99, 10).round().astype(int)
+    return KeyedPerformance(source, keys, truth[keys]), truth
+
+
+def test_the_path_is_a_spline_at_rest_before_the_first_key_and_after_the_last():
+    path, given_there = SmoothPath(60, KEYS), values()
+    found = path.influence @ given_there
+    order = np.argsort(KEYS)
+    spline = CubicSpline(KEYS[order], given_there[order], bc_type="clamped")
+    np.testing.assert_allclose(found[3:56], spline(np.arange(3, 56)), atol=1e-12)
+    np.testing.assert_allclose(found[:3], given_there[[1, 1, 1]], atol=1e-12)
+    np.testing.assert_allclose(found[56:], given_there[[3, 3, 3, 3]], atol=1e-12)
+
+
+def test_the_stiffness_tells_how_much_the_path_is_bent():
+    path, given_there = SmoothPath(60, KEYS), values(1)
+    order = np.argsort(KEYS)
+    bent = CubicSpline(KEYS[order], given_there[order, 0], bc_type="clamped").derivative(2)
+    times = np.linspace(3, 55, 20001)
+    expected = np.trapezoid(bent(times) ** 2, times)
+    assert given_there[:, 0] @ path.stiffness @ given_there[:, 0] == pytest.approx(expected, 1e-6)
+    np.testing.assert_allclose(path.stiffness.sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_the_path_is_what_a_gaussian_process_of_its_covariance_foretells():
+    path, given_there = SmoothPath(60, KEYS), values()
+    covariance, mean = path.covariance(), given_there.mean(axis=0)
+    found = mean + covariance @ np.linalg.pinv(covariance[KEYS]) @ (given_there - mean)
+    np.testing.assert_allclose(found, path.influence @ given_there, atol=1e-8)
+    np.testing.assert_allclose(covariance.sum(axis=1), 0.0, atol=1e-12)
+    np.testing.assert_allclose(covariance[KEYS].sum(axis=0), 0.0, atol=1e-12)
+    assert covariance[KEYS].diagonal().mean() == pytest.approx(1.0)
+
+
+def test_covariances_are_sound_for_keys_that_are_near_and_far():
+    for frames, keys in ((60, [0, 59]), (5000, [0, 1, 2, 4000]), (5000, range(0, 5000, 20))):
+        chosen = np.array(list(keys))
+        between_keys = SmoothPath(frames, chosen).covariance()[chosen]
+        assert np.linalg.eigvalsh(0.5 * (between_keys + between_keys.T)).min() > -1e-9
+        np.testing.assert_allclose(between_keys, between_keys.T, atol=1e-9)
+
+
+def test_what_a_path_misses_of_the_source_runs_from_nothing_to_its_whole_motion():
+    path = SmoothPath(60, KEYS)
+    steady = (path.influence @ values(12)).reshape(60, 4, 3)
+    noise = np.random.default_rng(1).normal(size=(60, 4, 3))
+    still = np.ones((60, 4, 3))
+    labels = np.zeros((len(KEYS), 4, 3))
+    missed = [path.missed(KeyedPerformance(x, KEYS, labels)) for x in (steady, still, noise)]
+    assert missed[0] < 1e-12
+    assert missed[1] == 0.0
+    assert missed[2] > 0.9
+
+
+@settings(max_examples=30, deadline=None)
+@given(SHARES, SHARES, st.floats(1.01, 3.0))
+def test_trust_falls_with_what_the_path_misses_and_rises_with_what_the_map_does(e, d, more):
+    trust = trust_in_path(e, d)
+    assert 0.0 <= trust_in_path(more * e, d) <= trust <= trust_in_path(e, more * d) <= MOST
+
+
+def test_trust_at_its_ends():
+    assert trust_in_path(0.0, 0.1) == MOST
+    assert trust_in_path(0.1, 0.0) == trust_in_path(0.0, 0.0) == 0.0
+    assert trust_in_path(1.0, 1e-300) == 0.0
+
+
+@pytest.mark.parametrize("power", [0.5, 0.7, 1.5, 2.0])
+def test_on_slow_ramps_the_default_is_no_worse_than_the_laplacian(power):
+    take, truth = ramp(power)
+    errors = {
+        name: np.linalg.norm(propagate(take, name) - truth) for name in ("residual", "laplacian")
+    }
+    assert errors["residual"] < errors["laplacian"]
+
+
+def test_slow_ramps_that_follow_linearly_are_left_to_the_source():
+    take, truth = ramp(1.0)
+    found = np.linalg.norm(propagate(take) - truth) / np.linalg.norm(truth - truth.mean(axis=0))
+    assert found < 1e-3
