@@ -8,7 +8,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 DEMO ?= build/demo
 
-.PHONY: demo test check format bench figures acceptance clean
+.PHONY: demo test check format docs bench figures acceptance clean
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -36,9 +36,12 @@ format: $(VENV)/.installed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+# The page of docs that is made from docstrings.
+docs: $(VENV)/.installed
+	$(BIN)/python docs/make_api.py
+
 bench: $(VENV)/.installed
-	$(BIN)/python -m experiments.bench.training
-	$(BIN)/python -m experiments.bench.mapping
+	$(BIN)/python -m experiments.bench
 	$(BIN)/python -m experiments.bench.topology
 
 # Both need the real recordings (FACERT_DATA), take their time, and continue where they stopped.

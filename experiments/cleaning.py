@@ -149,7 +149,7 @@ def measure(problem: Problem) -> dict[str, object]:
     }
     for name, method in METHODS.items():
         record[f"{name}, hidden"], record[f"{name}, seen"] = errors(problem, method(problem))
-    found = estimate(problem.given)
+    found = estimate(problem.given, problem.clock)
     record["facert, hidden"], record["facert, seen"] = errors(problem, found.frames)
     record["sigma"] = found.sigma
     inside = np.abs(found.frames - problem.truth) < 2.0 * found.std

@@ -23,6 +23,7 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data import FloatArray, IntArray
+from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
@@ -47,8 +48,8 @@ def retarget(track: Take, seed: int) -> Retargeted:
     """Train on some frames of a track and retarget others."""
     assert track.params is not None
     take, test = draw(track, LABELS, POSES - LABELS, seed)
-    retargeter = facert.train(take, Settings(seed=seed))
-    result = retargeter.retarget(take)
+    retargeter = facert.train(take, Settings(seed=seed, detect=False, smooth=False))
+    result = retargeter.retarget(take, handling=AS_IT_IS)
     assert result.params is not None
     assert result.std is not None
     some = np.random.default_rng(seed).permutation(test)[:TESTED]

@@ -25,6 +25,7 @@ import facert
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data import FloatArray
+from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.normalisation import Normalisation
 
@@ -47,7 +48,8 @@ def gpr(take: Take, frames: FloatArray) -> FloatArray:
 
 def shared(take: Take, settings: Settings) -> FloatArray:
     """Poses of every frame of the take by a shared model."""
-    result = facert.train(take, settings).retarget(take)
+    settings = replace(settings, detect=False, smooth=False)
+    result = facert.train(take, settings).retarget(take, handling=AS_IT_IS)
     assert result.params is not None
     return result.params
 

@@ -25,6 +25,7 @@ from experiments.tracks import read_track
 from facert import Settings, Take, train
 from facert.data import FloatArray, IntArray
 from facert.evaluation.comparison import Estimate, paired_ratio
+from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.suggestion.frames import suggest_frames
 
@@ -91,8 +92,9 @@ def error(take: Take, draw: Draw, labels: IntArray, method: str) -> float:
     assert take.params is not None
     given = part(take, np.union1d(labels, draw.unlabelled), labels, draw.poses)
     nothing = np.empty(0, dtype=np.int64)
-    result = train(given, Settings(method=method, seed=draw.seed)).retarget(
-        part(take, draw.test, nothing, nothing)
+    settings = Settings(method=method, seed=draw.seed, detect=False, smooth=False)
+    result = train(given, settings).retarget(
+        part(take, draw.test, nothing, nothing), handling=AS_IT_IS
     )
     assert result.params is not None
     return rms(result.params - take.params[draw.test])

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
+    from facert.model_file import load
     from facert.posing.pose import complete_pose
-    from facert.retargeter import Retargeter, load
+    from facert.retargeter import Retargeter
     from facert.settings import Settings
     from facert.suggestion.frames import suggest_frames
     from facert.training import train
@@ -58,7 +59,7 @@ _HOMES = {
     "Source": ("facert.data", "Source"),
     "Take": ("facert.data", "Take"),
     "complete_pose": ("facert.posing.pose", "complete_pose"),
-    "load": ("facert.retargeter", "load"),
+    "load": ("facert.model_file", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
     "suggest_frames": ("facert.suggestion.frames", "suggest_frames"),

@@ -54,6 +54,8 @@ class Source:
         one NaN coordinate is not observed at all.
     names : sequence of str, length M or D
         One name a marker or a weight, all different.
+    std : array, shape of the values, optional
+        Standard deviation of a cleaned source; NaN where there is none.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Source:
 
     values: FloatArray
     names: tuple[str, ...]
+    std: FloatArray | None = None
 
     def __post_init__(self) -> None:
         values = float_array(self.values, "/source")
@@ -109,9 +112,11 @@ class Source:
         """The source as one row a frame, (T, D) with D = 3 M for markers; NaN: not observed."""
         return self.values.reshape(len(self.values), -1)
 
-    def with_matrix(self, matrix: FloatArray) -> Source:
-        """The same markers or weights with other values, (T, D)."""
-        return Source(matrix.reshape(len(matrix), *self.values.shape[1:]), self.names)
+    def with_matrix(self, matrix: FloatArray, std: FloatArray | None = None) -> Source:
+        """The same markers or weights with other values, (T, D), and how uncertain these are."""
+        shape = (len(matrix), *self.values.shape[1:])
+        spread = None if std is None else std.reshape(shape)
+        return Source(matrix.reshape(shape), self.names, spread)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Ranges of whole numbers as options: ``10..40``, ``0..200:50``, ``10,15,20``."""
+"""Ranges of whole numbers as text: ``10..40``, ``0..200:50``, ``10,15,20``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 
 from facert.errors import InputError
 
-_RANGE = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")
+_RANGE = re.compile(r"(\d{1,9})\.\.(\d{1,9})(?::(\d{1,9}))?")
 INTERVALS = 3  # a range without a step is cut into about so many
 MOST = 1000
 
@@ -36,11 +36,23 @@ def parse_range(text: str, option: str) -> tuple[int, ...]:
         found = _RANGE.fullmatch(part.strip())
         if found is not None:
             numbers |= _span(text, option, *(int(group or -1) for group in found.groups()))
-        elif part.strip().isdecimal():
+        elif part.strip().isdecimal() and len(part.strip()) < 10:
             numbers.add(int(part))
         else:
             raise _bad(text, option)
     return tuple(sorted(numbers))
+
+
+def parse_frames(text: str, option: str) -> tuple[int, ...]:
+    """The frames of ``a..b``, all of them, or of a list such as ``0,12,30``, rising.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    parts = [part if ":" in part or ".." not in part else f"{part}:1" for part in text.split(",")]
+    return parse_range(",".join(parts), option)
 
 
 def default_step(low: int, high: int) -> int:

@@ -6,20 +6,40 @@ machine two threads have been measured ten times slower than one.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
-import torch
 from threadpoolctl import ThreadpoolController
 
 SMALL = 500  # points; up to this size one thread is used
 
 
 @cache
-def _controller() -> ThreadpoolController:
-    # Finding the loaded libraries takes milliseconds: once a process is enough.
+def _controller(with_torch: bool) -> ThreadpoolController:  # noqa: ARG001  one with, one without
+    # Finding the loaded libraries takes milliseconds.
     return ThreadpoolController()
+
+
+def _torch_is_here() -> bool:
+    # Importing it takes seconds, and most methods do without.
+    return "torch" in sys.modules
+
+
+@contextmanager
+def _one_torch_thread() -> Iterator[None]:
+    if not _torch_is_here():
+        yield
+        return
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 @contextmanager
@@ -28,10 +48,5 @@ def threads_for(points: int) -> Iterator[None]:
     if points > SMALL:
         yield
         return
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with _controller().limit(limits=1):
-            yield
-    finally:
-        torch.set_num_threads(before)
+    with _controller(_torch_is_here()).limit(limits=1), _one_torch_thread():
+        yield

@@ -12,16 +12,24 @@ import numpy as np
 from facert.data import Controls, FloatArray, Source, Take
 from facert.errors import InputError
 from facert.gplvm.noise import with_noise
-from facert.methods import make_method, method_class
+from facert.methods import method_class
 from facert.methods.base import Labelled, Report, Unlabelled
+from facert.neutral import at_rest, most_neutral
 from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.posing.known import keep
+from facert.preparation import Prepared, prepare
+from facert.ranges import parse_frames
+from facert.regions.layout import FaceData, method_for
+from facert.regions.resolution import resolved
 from facert.retargeter import Retargeter
 from facert.settings import LimitRule, Settings
+from facert.source_layout import SourceLayout
 from facert.training_set import TrainingSet, choose_training_set
 
 log = logging.getLogger(__name__)
+
+IN_TARGET_UNITS = ("training reconstruction", "error at poses left out")
 
 
 def train(
@@ -49,11 +57,17 @@ def train(
     controls = take.controls
     if controls is None:
         raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
-    take = replace(take, source=_observed_part(take.source))
-    _warn_of_zeros(take.source)
+    if take.std is not None:
+        log.warning("the poses have a standard deviation: they were foretold, and count as posed")
+    prepared = prepare(take, settings)
+    settings = replace(settings, regions=resolved(settings.regions, take, prepared.take))
+    take, source_units = prepared.take, prepared.units
+    if settings.sigma_t is None:
+        settings = replace(settings, sigma_t=prepared.step)
     data = choose_training_set(take, settings)
-    source_units = Normalisation.of(take.source.matrix, f"/source/{take.source.kind}")
-    settings = with_noise(settings, source_units.apply(_complete_frames(take.source, data)))
+    neutral = _neutral(take, data, settings)
+    complete = _complete_frames(take.source, data)
+    given, settings = settings, with_noise(settings, source_units.apply(complete))
     poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
     target_units = Normalisation.of(poses, "/target/params")
     labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
@@ -63,33 +77,36 @@ def train(
         target_units.apply(data.Y_unlabelled),
         target_units.apply(_unlimited(controls) if bounds is None else bounds.T),
     )
-    method = make_method(settings)
+    face = FaceData(prepared.measured, controls, poses, data.X_labelled, complete)
+    method = method_for(settings, given, face)
     began = time.perf_counter()
     report = method.fit(labelled, unlabelled, monitor or Monitor())
     seconds = time.perf_counter() - began
     return Retargeter(
         method=method,
-        source_kind=take.source.kind,
-        source_names=take.source.names,
+        layout=SourceLayout(take.source.kind, take.source.names),
         units=take.units,
         controls=controls,
         bounds=bounds,
         source_units=source_units,
         target_units=target_units,
-        figures=_figures(report, seconds, labelled),
+        figures=_noise_figures(prepared, take.units)
+        | _figures(report, seconds, labelled, target_units),
+        neutral=neutral,
+        motion=prepared.motion,
         poses=keep(data.Y_labelled, take.animation, settings.seed),
     )
 
 
-def _observed_part(source: Source) -> Source:
-    """The source without markers or weights that no frame shows: nothing can be learned of them."""
-    seen = np.asarray(source.valid.any(axis=0))
-    if seen.all():
-        return source
-    silent = [name for name, there in zip(source.names, seen, strict=True) if not there]
-    log.warning("never observed in the take, left out: %s", ", ".join(silent))
-    names = tuple(name for name, there in zip(source.names, seen, strict=True) if there)
-    return Source(source.values[:, seen], names)
+def _neutral(take: Take, data: TrainingSet, settings: Settings) -> FloatArray:
+    """The source with the actor at rest, (d_x,); see `Settings.neutral`."""
+    if settings.neutral is None:
+        return np.asarray(data.X_labelled[most_neutral(data.Y_labelled)])
+    frames = np.array(parse_frames(settings.neutral, "neutral"), dtype=np.int64)
+    rest = at_rest(take.source.matrix, frames)
+    if np.isnan(rest).any():
+        raise InputError("neutral", "frames that show the face", "hidden markers", "Name others.")
+    return rest
 
 
 def _bounds(take: Take, labelled: FloatArray, rule: LimitRule) -> FloatArray | None:
@@ -118,16 +135,18 @@ def _complete_frames(source: Source, data: TrainingSet) -> FloatArray:
     return complete if len(complete) > len(filled) else filled
 
 
-def _warn_of_zeros(source: Source) -> None:
-    """Some systems write (0, 0, 0) for a marker that was lost."""
-    if source.kind != "markers":
-        return
-    zeros = int(np.sum(~source.values.any(axis=2)))
-    if zeros:
-        log.warning("%d marker positions are exactly (0, 0, 0): lost ones should be NaN", zeros)
+def _noise_figures(prepared: Prepared, unit: str) -> dict[str, Any]:
+    """What was told of noise and motion, in the take's units."""
+    if prepared.smoothed is None:
+        return {}
+    unit = f", {unit}" if unit else ""
+    found = prepared.smoothed
+    return {f"capture noise{unit}": found.sigma, f"motion a frame{unit}": found.sigma_t}
 
 
-def _figures(report: Report, seconds: float, labelled: Labelled) -> dict[str, Any]:
+def _figures(
+    report: Report, seconds: float, labelled: Labelled, target_units: Normalisation
+) -> dict[str, Any]:
     figures: dict[str, Any] = {
         "labelled frames": len(labelled.X),
         "seconds": seconds,
@@ -140,4 +159,6 @@ def _figures(report: Report, seconds: float, labelled: Labelled) -> dict[str, An
             "iterations": result.iterations,
             "status": result.status,
         }
-    return figures | dict(report.figures)
+    unit = target_units.scale  # of errors, so that they compare with what retarget tells
+    told = {n: v * unit if n in IN_TARGET_UNITS else v for n, v in report.figures.items()}
+    return figures | told

@@ -23,6 +23,8 @@ from facert.settings import Settings
         ("tolerance", float("inf"), "finite"),
         ("target_noise_floor", -1.0, "at least 0"),
         ("optimizer", "adam", "one of lbfgs, scg"),
+        ("likelihood", "dtc", "one of auto, exact, vfe, fitc"),
+        ("inducing", 0, "at least 1"),
         ("device", 1, "str"),
     ],
 )

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.cleaning.estimate import estimate
-from facert.data import BoolArray, FloatArray, Take
+from facert.data import BoolArray, Take
 from facert.names import NameIndex
 
 if TYPE_CHECKING:
+    from facert.handling import Handling
     from facert.retargeter import Retargeter
 
 log = logging.getLogger(__name__)
@@ -27,15 +28,12 @@ class Cleaned:
     take : Take
     filled : array of bool, shape (T, M) or (T, D)
         What had not been observed and is now known.
-    std : array, shape of the source's values, or None
-        Standard deviation of every value, where the method tells; NaN where there is none.
     sigma : float or None
         Standard deviation of the capture noise that was removed, in the take's units.
     """
 
     take: Take
     filled: BoolArray
-    std: FloatArray | None = None
     sigma: float | None = None
 
 
@@ -45,7 +43,6 @@ def clean(take: Take, sigma: float | None = None) -> Cleaned:
     Parameters
     ----------
     take : Take
-        Frames are taken to be evenly spaced in time.
     sigma : float, optional
         Standard deviation of the capture noise, in the take's units; from the take by default.
 
@@ -60,29 +57,33 @@ def clean(take: Take, sigma: float | None = None) -> Cleaned:
         When nothing in the take moves.
     """
     source = take.source
-    found = estimate(source.matrix, sigma)
+    found = estimate(source.matrix, take.time, sigma)
     ever = np.asarray(source.valid.any(axis=0)).tolist()
     lost = [n for n, seen in zip(source.names, ever, strict=True) if not seen]
     if lost:
         log.warning("never observed, left open: %s", ", ".join(lost))
-    cleaned = source.with_matrix(found.frames)
-    std = found.std.reshape(source.values.shape)
+    cleaned = source.with_matrix(found.frames, found.std)
     return Cleaned(
-        replace(take, source=cleaned), np.asarray(cleaned.valid & ~source.valid), std, found.sigma
+        replace(take, source=cleaned), np.asarray(cleaned.valid & ~source.valid), found.sigma
     )
 
 
-def clean_with_model(take: Take, retargeter: Retargeter) -> Cleaned:
+def clean_with_model(
+    take: Take, retargeter: Retargeter, handling: Handling | None = None
+) -> Cleaned:
     """Fill gaps and remove noise by a trained model, which knows the actor from its training take.
 
-    The result holds the model's markers or weights, without uncertainty.
+    The result holds the model's markers or weights.
 
     Raises
     ------
     InputError
         When the source does not suit the model.
     """
-    found = retargeter.retarget(take).source
+    if not retargeter.method.stepwise:
+        name = retargeter.settings.method
+        log.warning("%s cleans by the take alone; shared models clean by what they learned", name)
+    found = retargeter.retarget(take, handling=handling).source
     index = NameIndex(take.source.names)
     places = [index.find(name) for name in found.names]
     shown = np.zeros(found.valid.shape, dtype=np.bool_)

@@ -1,33 +1,31 @@
-"""A take without noise and gaps, from itself alone.
-
-Two layers, each smooth in time: the few factors that move the face, estimated over all frames
-together from whatever each shows, and what of every column they leave over, which tells between
-one sight of a marker and the next.
-"""
+"""A take without noise and gaps, from itself alone."""
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 
-from facert.cleaning.factors import Factors
-from facert.cleaning.interpolation import interpolated
-from facert.cleaning.matern import decay
+from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
-from facert.cleaning.smoothing import Smoothed, smooth_factors, smooth_series
-from facert.data import FloatArray
-from facert.normalisation import Normalisation
+from facert.data import FloatArray, IntArray
+from facert.normalisation import STILL, Normalisation
+from facert.threads import threads_for
 
-FACTORS = 16
-FIT = 1000
-"""Frames that the factors are learned from, at most, evenly spread."""
+log = logging.getLogger(__name__)
+
+FEWEST = 10
+"""Frames; in fewer there is no telling noise from motion."""
+UNRELATED = 0.5
+"""Frames whose differences from one to the next have this share of the variance that differences
+of unrelated frames have do not follow each other."""
 LEAST_NOISE = 1e-4
 """Least standard deviation of the noise, normalised units: half a micrometre of skin."""
-START = 0.95
-"""Correlation of a factor in neighbouring frames, to begin with."""
-STRETCH, STRETCHES, ROUNDS = 40, 25, 3
-"""How quickly factors move is learned from so many stretches of so many frames, in rounds."""
+ORDINARY = 0.9
+"""This share of the steps from frame to frame is no gap."""
+LONGEST = 60
+"""Frames; after a longer gap in time a face may be anywhere, so none is taken to be longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +38,38 @@ class Estimate:
         Mean and standard deviation; NaN in columns that were never observed.
     sigma : float
         Standard deviation of the capture noise.
+    motion : Motion
+        How the observed columns move, in `units`.
+    units : Normalisation
+        Of the observed columns.
     """
 
     frames: FloatArray
     std: FloatArray
     sigma: float
+    motion: Motion
+    units: Normalisation
+
+    def told(self, unit: str) -> str:
+        """What was estimated, for people."""
+        unit = f" {unit}" if unit else ""
+        return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} a frame"
+
+    @property
+    def sigma_t(self) -> float:
+        """How far the column that moves most goes from frame to frame, RMS."""
+        return largest_step(self.frames)
 
 
-def estimate(X: FloatArray, sigma: float | None = None) -> Estimate:
-    """The joint estimate of all frames.
+def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Estimate:
+    """The joint estimate of all frames, see `facert.cleaning.motion`.
 
     Parameters
     ----------
     X : array, shape (T, d)
-        Frames, evenly spaced in time; NaN: not observed.
+        Frames; NaN: not observed.
+    time : array, shape (T,)
+        Seconds, rising. What is longer than a typical step is a gap that hides frames.
     sigma : float, optional
         Standard deviation of the capture noise; from the frames by default.
 
@@ -62,62 +78,76 @@ def estimate(X: FloatArray, sigma: float | None = None) -> Estimate:
     InputError
         When nothing moves.
     """
-    sigma = capture_noise(X) if sigma is None else sigma
+    places, step = grid(time)
+    spread = np.full((places[-1] + 1, X.shape[1]), np.nan)
+    spread[places] = X
+    sigma = capture_noise(spread) if sigma is None else sigma
     ever = ~np.isnan(X).all(axis=0)
     units = Normalisation.of(X[:, ever], "/source")
-    mean, variance = _layers(units.apply(X[:, ever]), max(sigma / units.scale, LEAST_NOISE))
+    noise = max(sigma / units.scale, LEAST_NOISE)
+    normalised = units.apply(spread[:, ever])
+    with threads_for(1):
+        motion = Motion.learned(normalised, noise, step)
+        mean, variance = motion.smooth(normalised, noise)
     frames, std = np.full(X.shape, np.nan), np.full(X.shape, np.nan)
-    frames[:, ever], std[:, ever] = units.undo(mean), units.scale * np.sqrt(variance)
-    return Estimate(frames, std, sigma)
+    frames[:, ever] = units.undo(mean[places])
+    std[:, ever] = units.scale * np.sqrt(variance[places])
+    return Estimate(frames, std, sigma, motion, units)
 
 
-def _layers(X: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance of normalised frames (T, d), every column of which was seen."""
-    seen = ~np.isnan(X)
-    filled = interpolated(X, np.arange(len(X), dtype=np.float64))
-    some = np.unique(np.linspace(0, len(X) - 1, min(FIT, len(X))).round().astype(np.int64))
-    some = some if seen[some].any(axis=0).all() else np.arange(len(X))
-    factors = Factors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
-    factors, a = _paced(factors, X)
-    found = smooth_factors(*factors.information(X), a)
-    frames = factors.frames(found.mean)
-    rest, rest_variance = _rest(np.where(seen, X - frames, np.nan), sigma)
-    variance = factors.variance(found.covariance) + rest_variance
-    # The layers take each other for noise: of what was seen, both know less than the sight told.
-    return frames + rest, np.where(seen, np.minimum(variance, sigma**2), variance)
+def estimate_if_it_moves(
+    X: FloatArray, time: FloatArray, sigma: float | None = None
+) -> Estimate | None:
+    """The joint estimate of a performance; None for single poses, or a face that never moves."""
+    seen = X[:, ~np.isnan(X).all(axis=0)]
+    spread = float(np.nanstd(seen, axis=0).max())
+    if len(X) < FEWEST or not spread > STILL * float(np.nanmax(np.abs(seen))):
+        return None
+    if sigma is None and _relation(seen) > UNRELATED:
+        log.warning("the frames do not follow each other smoothly: each is taken on its own")
+        return None
+    return estimate(X, time, sigma)
 
 
-def _paced(factors: Factors, X: FloatArray) -> tuple[Factors, FloatArray]:
-    """The factors in units of their deviation, and how quickly each moves."""
-    length = min(STRETCH, len(X))
-    starts = np.unique(np.linspace(0, len(X) - length, STRETCHES).round().astype(np.int64))
-    windows = X[starts + np.arange(length)[:, None]]  # (length, stretches, d)
-    q = factors.weights.shape[1]
-    a = decay(np.full(q, START))
-    if length < 2:
-        return factors, a
-    for _ in range(ROUNDS):
-        precision, pull = factors.information(windows.reshape(-1, X.shape[1]))
-        shape = windows.shape[:2]
-        found = smooth_factors(precision.reshape(*shape, q, q), pull.reshape(*shape, q), a)
-        square = _squares(found)
-        a = decay(found.following.mean(axis=(0, 1)) / square)
-        factors = factors.scaled(np.sqrt(square))
-    return factors, a
+def _relation(X: FloatArray) -> float:
+    """Variance of the difference between neighbouring frames, relative to that of unrelated ones.
+
+    Of the column where it is least: others may be noise alone.
+    """
+    steps, variance = np.diff(X, axis=0), np.nanvar(X, axis=0)
+    known = (variance > 0.0) & ~np.isnan(steps).all(axis=0)
+    relations = np.nanmean(steps[:, known] ** 2, axis=0) / (2.0 * variance[known])
+    return float(relations.min(initial=np.inf))
 
 
-def _squares(found: Smoothed) -> FloatArray:
-    """Mean square of each factor, (q,)."""
-    own = np.diagonal(found.covariance, axis1=-2, axis2=-1)
-    return np.asarray((found.mean**2 + own).mean(axis=(0, 1)))
+def largest_step(X: FloatArray, sigma: float = 0.0) -> float:
+    """RMS step from frame to frame of the column that moves most, less what is noise.
+
+    Parameters
+    ----------
+    X : array, shape (T, d)
+        NaN: not observed.
+    sigma : float
+        Standard deviation of the capture noise.
+    """
+    squares = np.diff(X, axis=0) ** 2
+    known = ~np.isnan(squares)
+    means = np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return float(np.sqrt(max(means.max(initial=0.0) - 2.0 * sigma**2, sigma**2)))
 
 
-def _rest(left: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Smooth what the factors leave over, each column on its own; NaN: not observed."""
-    noise = sigma**2
-    variance = np.maximum(np.nanmean(left**2, axis=0) - noise, noise * 1e-2)
-    steps = np.diff(left, axis=0) ** 2
-    known = ~np.isnan(steps).all(axis=0)
-    rough = variance.copy()
-    rough[known] = np.maximum(np.nanmean(steps[:, known], axis=0) / 2.0 - noise, 0.0)
-    return smooth_series(left, ~np.isnan(left), variance, noise, decay(1.0 - rough / variance))
+def grid(time: FloatArray) -> tuple[IntArray, float]:
+    """Places (T,) of frames on an even grid, and its step in seconds: a typical one.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        Seconds, rising. Gaps longer than `LONGEST` frames are cut short.
+    """
+    steps = np.diff(time)
+    if not len(steps):
+        return np.zeros(1, dtype=np.int64), 1.0
+    # Not the median: packets may come in bursts.
+    step = float(np.sort(steps)[: max(int(ORDINARY * len(steps)), 1)].mean())
+    passed = np.clip(np.round(steps / step), 1, LONGEST)
+    return np.concatenate([[0], np.cumsum(passed)]).astype(np.int64), step

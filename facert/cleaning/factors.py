@@ -8,11 +8,14 @@ columns, estimated through the same gaps, needs far more frames.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from facert.data import BoolArray, FloatArray
+from facert.learned import Arrays
 
 ITERATIONS = 16
 COARSE, FINE = 0.1, 1e-3
@@ -23,7 +26,7 @@ ONCE_MORE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Factors:
+class Factors(Arrays):
     """What moves together.
 
     Parameters
@@ -35,6 +38,8 @@ class Factors:
     noise : array, shape (d,)
         Variance of e.
     """
+
+    axes: ClassVar[Mapping[str, str]] = {"mean": "x", "weights": "xq", "noise": "x"}
 
     mean: FloatArray
     weights: FloatArray
@@ -101,6 +106,15 @@ class Factors:
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Variance of W z, (n, d), for covariances of the factors, (n, q, q)."""
         return np.asarray(np.einsum("nkd,dk->nd", covariance @ self.weights.T, self.weights))
+
+    @property
+    def count(self) -> int:
+        """q, how many there are."""
+        return int(self.weights.shape[1])
+
+    def with_noise(self, more: float, least: float = 0.0) -> Factors:
+        """The same with so much more (or less) noise in every column, at least so much."""
+        return Factors(self.mean, self.weights, np.maximum(self.noise + more, least))
 
     def scaled(self, deviation: FloatArray) -> Factors:
         """For factors measured in units of their standard deviation, (q,)."""

@@ -98,7 +98,7 @@ def smooth_series(
     Q = variance[:, None, None] * (np.eye(2) - F @ F.transpose(0, 2, 1))
     states = np.empty((frames, 2, 5, d))  # before and after; value, velocity, their covariance
     m, P = np.zeros((2, d)), np.stack([variance, np.zeros(d), variance])
-    forward = _forward_covariance(F)
+    forward = forward_covariance(transition(a))
     drift = np.stack([Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 1]])
     f = F.transpose(1, 2, 0)
     for t in range(frames):
@@ -113,9 +113,9 @@ def smooth_series(
     return _backward(states, F)
 
 
-def _forward_covariance(F: FloatArray) -> FloatArray:
-    """The matrix (3, 3, d) that takes the covariance of value and velocity one frame on."""
-    (p, q), (r, s) = F.transpose(1, 2, 0)
+def forward_covariance(F: FloatArray) -> FloatArray:
+    """Takes the covariance of value and velocity one frame on, (3, 3, d), by `transition` F."""
+    (p, q), (r, s) = F
     return np.stack(
         [
             np.stack([p * p, 2.0 * p * q, q * q]),

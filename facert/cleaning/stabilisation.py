@@ -7,6 +7,7 @@ frames loses its weight there (iteratively reweighted, with the weights of Geman
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +19,8 @@ from facert.cleaning.rigid import RigidMotion, align, determined, mean_motion
 from facert.data import BoolArray, FloatArray, IntArray, Source, Take
 from facert.errors import InputError
 from facert.names import match
+
+log = logging.getLogger(__name__)
 
 SHARE, FEWEST = 0.3, 5
 """How many markers are taken for stable: this share of all, this many at least."""
@@ -68,7 +71,7 @@ class Stabilised:
 def stabilise(
     take: Take,
     stable: Sequence[str] | Literal["automatic"] = "automatic",
-    reference: int | Literal["mean"] = "mean",
+    reference: int | Literal["mean"] | Take = "mean",
 ) -> Stabilised:
     """Remove the head's rigid motion.
 
@@ -78,8 +81,10 @@ def stabilise(
         Of markers; gaps are allowed.
     stable : sequence of str, or "automatic"
         Names of markers that hardly move against the skull, or `stable_markers`.
-    reference : int or "mean"
-        The frame whose head pose all frames get, or the mean pose.
+    reference : int or "mean" or Take
+        The frame whose head pose all frames get, or the mean pose; or another take of the actor
+        that was stabilised before, whose head pose, and stable markers if they are to be found,
+        this one gets.
 
     Returns
     -------
@@ -95,6 +100,9 @@ def stabilise(
         no frame shows enough.
     """
     markers = _markers(take.source)
+    if isinstance(reference, Take) and stable == "automatic":
+        found = stable_markers(_markers(reference.source))
+        stable = [reference.source.names[index] for index in found]
     chosen = _chosen(take.source, stable)
     shape = _mean_shape(markers[:, chosen])
     seen = ~np.isnan(markers[:, chosen, 0])
@@ -102,7 +110,12 @@ def stabilise(
     _require_known(known)
     shape, motion = _rigid(shape, markers[:, chosen], known)
     motion = motion.interpolated(take.time, known)
-    head = motion.after(_pose(motion, known, reference).inverse())
+    if isinstance(reference, Take):
+        steady = _steady_shape(reference.source, take.source, chosen)
+        pose = align(shape, steady, np.ones(steady.shape[:2]))
+    else:
+        pose = _pose(motion, known, reference)
+    head = motion.after(pose.inverse())
     left = np.linalg.norm(motion.undo(markers[:, chosen]) - shape, axis=2)[known[:, None] & seen]
     return Stabilised(
         replace(take, source=Source(head.undo(markers), take.source.names)),
@@ -173,6 +186,7 @@ def _markers(source: Source) -> FloatArray:
 
 def _chosen(source: Source, stable: Sequence[str] | Literal["automatic"]) -> IntArray:
     if stable == "automatic":
+        log.warning("stable markers found automatically differ from take to take: check them")
         return stable_markers(source.values)
     if len(stable) < 3:
         raise InputError("--stable", "three markers or more", f"{len(stable)}", "Name more.")
@@ -234,6 +248,17 @@ def _pose(motion: RigidMotion, known: BoolArray, reference: int | Literal["mean"
         expected = f"a frame from 0 to {len(motion) - 1} that shows three stable markers"
         raise InputError("--reference", expected, found, "Choose another frame, or mean.")
     return motion.at(reference)
+
+
+def _steady_shape(steady: Source, source: Source, chosen: IntArray) -> FloatArray:
+    """Where a stabilised take has the stable markers of another, (1, S, 3)."""
+    names = [source.names[index] for index in chosen]
+    places = _markers(steady)[:, match(names, steady.names, "--like")]
+    if np.isnan(places).all(axis=0).any():
+        raise InputError(
+            "--like", "a take that shows the stable markers", "one that hides some", "Name others."
+        )
+    return np.asarray(np.nanmedian(places, axis=0)[None])
 
 
 def _require_known(known: BoolArray) -> None:

@@ -18,17 +18,22 @@ from facert.cli import (
     demo,
     drive,
     evaluate,
+    export_script,
     inspect,
+    live,
     plot,
     points,
     pose,
     propagate,
+    regions,
     render,
+    report,
     retarget,
     simulate,
     stabilise,
     suggest,
     train,
+    view,
 )
 from facert.errors import FacertError
 
@@ -75,7 +80,9 @@ def options(
 
 app.command("suggest")(suggest.command)
 app.command("train")(train.command)
+app.command("regions")(regions.command)
 app.command("retarget")(retarget.command)
+app.command("live")(live.command)
 app.command("pose")(pose.command)
 app.command("propagate")(propagate.command)
 app.command("drive")(drive.command)
@@ -83,12 +90,15 @@ app.add_typer(points.app, name="points")
 app.command("stabilise")(stabilise.command)
 app.command("clean")(clean.command)
 app.command("convert")(convert.command)
+app.command("export-script")(export_script.command)
 app.command("inspect")(inspect.command)
 app.command("simulate")(simulate.command)
 app.command("demo")(demo.command)
+app.command("view")(view.command)
 app.command("render")(render.command)
 app.command("plot")(plot.command)
 app.command("eval")(evaluate.command)
+app.command("report")(report.command)
 
 
 def main() -> None:

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from numpy.typing import NDArray
 
 from facert.cli import console
-from facert.errors import OutputExistsError, reading
+from facert.cli.batch import carry_out, plan
+from facert.cli.options import ENDING, JOBS, OUT_DIR
+from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.cleaning.cleaning import Cleaned
     from facert.data import Take
+    from facert.handling import Handling
 
 
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Take with gaps and noise.")],
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Result: .h5, with its uncertainty, or .csv.")
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="IN OUT",
+            help="Take with gaps and noise, and result: .h5, with its uncertainty, or .csv. With "
+            "--out-dir: any number of takes, or folders of takes.",
+        ),
     ],
     model: Annotated[
         Path | None,
@@ -38,38 +45,59 @@ def command(
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several.")
     ] = None,
+    out_dir: OUT_DIR = None,
+    ending: ENDING = ".h5",
+    jobs: JOBS = 1,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
 ) -> None:
     """Fill gaps in markers or weights, and remove noise.
 
     Frozen, swapped and otherwise bad markers are taken as not observed. OUT.h5 has a standard
-    deviation for every value as /source/std (not with --model), and /source/filled tells what had
+    deviation for every value as /source/std, and /source/filled tells what had
     not been observed. What was never observed stays open.
     """
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
-    if model is not None and sigma is not None:
-        raise typer.BadParameter("--sigma: a model has learned its own noise", param_hint="--sigma")
+    todo = plan(paths, out_dir, ending, overwrite)
+    work = partial(
+        _clean,
+        model=model,
+        no_detect=no_detect,
+        sigma=sigma,
+        target=target,
+        overwrite=overwrite,
+    )
+    carry_out(todo, work, jobs, overwrite)
+
+
+def _clean(
+    source: Path,
+    output: Path,
+    *,
+    model: Path | None,
+    no_detect: bool,
+    sigma: float | None,
+    target: str | None,
+    overwrite: bool,
+) -> None:
+    """One take."""
     from facert.cli.cleaned_take import read_observed, write_beside
+    from facert.handling import Handling
 
     take = read_observed(source, target, no_detect)
     with reading(source):
-        cleaned = _cleaned(take, model, sigma)
-    beside: dict[str, NDArray[Any]] = {"/source/filled": cleaned.filled}
-    if cleaned.std is not None:
-        beside["/source/std"] = cleaned.std
-    write_beside(cleaned.take, output, overwrite, beside)
+        # Bad markers are hidden by now, if they are to be.
+        cleaned = _cleaned(take, model, Handling(detect=False, sigma=sigma))
+    write_beside(cleaned.take, output, overwrite, {"/source/filled": cleaned.filled})
     _print_changes(cleaned, output)
 
 
-def _cleaned(take: Take, model: Path | None, sigma: float | None) -> Cleaned:
+def _cleaned(take: Take, model: Path | None, handling: Handling) -> Cleaned:
     from facert.cleaning.cleaning import clean, clean_with_model
 
     if model is None:
-        return clean(take, sigma)
-    from facert.retargeter import load
+        return clean(take, handling.sigma)
+    from facert.model_file import load
 
-    return clean_with_model(take, load(model))
+    return clean_with_model(take, load(model), handling)
 
 
 def _print_changes(cleaned: Cleaned, output: Path) -> None:

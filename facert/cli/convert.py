@@ -2,107 +2,119 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from facert.cli import console
+from facert.cli.batch import carry_out, plan
+from facert.cli.options import ENDING, JOBS, OUT_DIR
+
+if TYPE_CHECKING:
+    from facert.cli.conversion import Wanted
+    from facert.conversion import Changes
+
+
+class Kind(StrEnum):
+    """What to read of a file that can hold both."""
+
+    take = "take"
+    rig = "rig"
 
 
 def command(
-    source: Annotated[
-        Path,
+    paths: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="IN",
-            help="A take, a rig or a mesh sequence: .h5, .csv (Live Link Face or plain), .npz,"
-            " folder of .obj.",
+            metavar="IN OUT",
+            help="IN: a take (.h5, .csv of Live Link Face or plain, .json of Audio2Face, .txt of"
+            " Face Cap, .c3d, .trc, .npz), a rig (.h5, .glb, .gltf, .npz, folder of .obj) or a mesh"
+            " sequence. OUT, whose ending tells the format: .h5, .livelink.csv, .csv, .json; .glb"
+            " or .usd for a rig, and with --rig for a take. With --out-dir: any number of files,"
+            " or folders of takes.",
         ),
     ],
-    output: Annotated[
-        Path,
-        typer.Argument(
-            metavar="OUT",
-            help="Its ending tells the format: .h5, .livelink.csv (Live Link Face), .csv, or"
-            " .glb for a face in motion.",
-        ),
-    ],
+    kind: Annotated[
+        Kind | None, typer.Option(help="What to read of a .glb that holds both; else the rig.")
+    ] = None,
     target: Annotated[
-        str | None, typer.Option(help="Which of several targets of an .npz track.")
+        str | None, typer.Option(help="Which target of an .npz track, or animation of a .glb.")
     ] = None,
     shapes: Annotated[
         str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
     ] = None,
+    map_path: Annotated[
+        Path | None, typer.Option("--map", metavar="TOML", help='New names: theirs = "ours".')
+    ] = None,
+    poses_path: Annotated[
+        Path | None,
+        typer.Option(
+            "--poses",
+            metavar="FILE",
+            help="Labels from another file, by its column frame (from 0) or by time.",
+        ),
+    ] = None,
+    in_fps: Annotated[
+        float | None, typer.Option(min=1e-3, help="Frames a second of IN, if it does not say.")
+    ] = None,
     fps: Annotated[
-        float | None, typer.Option(min=1e-3, help="Frames a second, if IN does not say.")
+        float | None, typer.Option(min=1e-3, help="Frames a second of OUT: resampled by time.")
     ] = None,
+    in_units: Annotated[str, typer.Option(help="Unit of IN, whatever it says.")] = "",
     units: Annotated[
-        str | None, typer.Option(help="Unit of length, e.g. cm, whatever IN says; numbers stay.")
+        str, typer.Option(help="Unit of OUT: m, cm, mm, in or ft; numbers are converted.")
+    ] = "",
+    in_up_axis: Annotated[str, typer.Option(help="The axis up in IN, whatever it says.")] = "",
+    up_axis: Annotated[str, typer.Option(help="The axis up in OUT: y, z or x; turned.")] = "",
+    start_timecode: Annotated[str, typer.Option(help="Of the first frame, HH:MM:SS:FF.")] = "",
+    rig_path: Annotated[
+        Path | None, typer.Option("--rig", help="The character's rig, for a take as .glb or .usd.")
     ] = None,
-    rig: Annotated[
-        Path | None, typer.Option(help="The character's rig, for a take as .glb.")
-    ] = None,
+    out_dir: OUT_DIR = None,
+    ending: ENDING = ".h5",
+    jobs: JOBS = 1,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
 ) -> None:
     """Convert a take, a rig or a mesh sequence to another format.
 
     Shapes are matched by name in any spelling; rows without a face are dropped and counted.
-    A .csv holds the poses when there are any, else the source. A .glb holds the shapes of the rig
-    that a take moves, or the few morph targets that move a mesh as its sequence does.
+    A .csv or .json holds the poses when there are any, else the source. A .glb or .usd holds the
+    shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
+    does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
     """
-    from dataclasses import replace
+    from facert.cli.conversion import Wanted
+    from facert.conversion import Changes
+    from facert.io.poses import read_poses
+    from facert.io.toml import read_toml
 
-    from facert.data import Rig
-    from facert.io import formats
-
-    if output.suffix.lower() == ".glb":
-        said = _to_glb(source, output, target, rig, shapes, overwrite)
-        console.out.print(f"{output}: {said}", markup=False)
-        return
-    found = formats.read_any(source, target=target, shapes=shapes, fps=fps)
-    if units is not None:
-        found = replace(found, units=units)
-    if isinstance(found, Rig):
-        formats.write_rig_file(found, output, overwrite)
-        what = f"a rig with {len(found.neutral)} vertices and {len(found.names)} shapes"
-    else:
-        formats.write_take_file(found, output, overwrite)
-        what = (
-            f"a take with {len(found)} frames of {len(found.source.names)} {found.source.kind}"
-            f" and {len(found.labels)} poses"
-        )
-    console.out.print(f"{output}: {what}", markup=False)
+    changes = Changes(
+        names=read_toml(map_path) if map_path else {},
+        poses=read_poses(poses_path, in_fps) if poses_path else None,
+        fps=fps,
+        in_units=in_units,
+        units=units,
+        in_up_axis=in_up_axis,
+        up_axis=up_axis,
+        start_timecode=start_timecode,
+    )
+    wanted = Wanted(kind.value if kind else None, target, shapes, in_fps or fps, rig_path)
+    todo = plan(paths, out_dir, ending, overwrite)
+    carry_out(
+        todo,
+        partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite),
+        jobs,
+        overwrite,
+    )
 
 
-def _to_glb(
-    source: Path,
-    output: Path,
-    target: str | None,
-    rig_path: Path | None,
-    shapes: str | None,
-    overwrite: bool,
-) -> str:
-    """Write a mesh sequence, or a rig in the poses of a take, as a GLB file."""
-    from facert.errors import InputError, OutputExistsError, reading
-    from facert.io import formats
-    from facert.io.glb import write_glb
-    from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-    from facert.morphs import compact_morphs, rig_morphs
-    from facert.view.faces import control_settings
+def _convert(
+    source: Path, output: Path, *, wanted: Wanted, changes: Changes, overwrite: bool
+) -> None:
+    """One file."""
+    from facert.cli.conversion import convert_file
 
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
-    if holds_mesh_sequence(source):
-        with open_mesh_sequence(source) as sequence:
-            morphs = compact_morphs(sequence)
-    else:
-        take = formats.read_take_file(source, target)
-        with reading(source):
-            if rig_path is None:
-                raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
-            rig = formats.read_rig_file(rig_path, shapes)
-            settings = control_settings(take, rig, range(len(take)))
-            morphs = rig_morphs(rig, settings, take.time)
-    write_glb(morphs, output, overwrite)
-    error = f", off by {morphs.error:.2g} at most" if morphs.error else ""
-    return f"{len(morphs.time)} frames of {len(morphs.targets)} morph targets{error}"
+    said = convert_file(source, output, wanted, changes, overwrite)
+    console.out.print(f"{output}: {said}", markup=False)

@@ -89,13 +89,13 @@ def command(
     from facert.cli.evaluation_run import open_journal, run_cells
     from facert.cli.evaluation_table import error_table
     from facert.cli.pictures import save_picture
-    from facert.cli.ranges import parse_range
     from facert.evaluation.advice import advise
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
     from facert.evaluation.run import Grid
     from facert.evaluation.summary import summarise
     from facert.io.formats import read_rig_file
+    from facert.ranges import parse_range
 
     grid = Grid(
         methods=_methods(methods),
@@ -185,7 +185,7 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
     from dataclasses import asdict
 
     import facert
-    from facert.retargeter import library_versions
+    from facert.model_file import library_versions
 
     return {
         **asdict(grid),

@@ -39,7 +39,7 @@ def command(
 def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]:
     """What a file holds, ready for JSON."""
     if path.suffix.lower() == ".safetensors":
-        from facert.retargeter import load
+        from facert.model_file import load
 
         return {"kind": "model", **load(path).facts}
     from dataclasses import asdict
@@ -61,7 +61,7 @@ def _table(title: str, facts: Mapping[str, Any]) -> Table:
 
     # Text, not str: a name in brackets is no markup.
     table = Table(title=Text(title), title_justify="left", box=box.SIMPLE, show_header=False)
-    table.add_column(style="bold", no_wrap=True)
+    table.add_column(style="bold", max_width=44)
     table.add_column(overflow="fold")
     for label, text in _lines(facts):
         table.add_row(label, Text(text))

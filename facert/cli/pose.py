@@ -23,16 +23,23 @@ SMALL = 0.005  # of a control's range: such values are not worth a line
 
 def command(
     wanted: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="A control; again for more."),
-    ],
+    ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="A take (.h5, .csv, .livelink.csv), or .json."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="A take (.h5, .csv, .livelink.csv), or .json; --view: TAKE.posed.h5.",
+        ),
     ] = None,
     model: Annotated[
-        Path, typer.Option("--model", "-m", help="Model file that train wrote.")
-    ] = DEFAULT_MODEL,
+        Path | None,
+        typer.Option(
+            "--model", "-m", help="Model file that train wrote.", show_default=str(DEFAULT_MODEL)
+        ),
+    ] = None,
     poses: Annotated[
         Path | None, typer.Option("--poses", help="A take with known poses, instead of a model's.")
     ] = None,
@@ -48,8 +55,33 @@ def command(
         str | None, typer.Option(help="Which of several targets of .npz takes.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the output.")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Pose in the browser, with a slider a control.")
+    ] = False,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="The character's rig, for --view.")
+    ] = None,
+    take: Annotated[
+        Path | None, typer.Option("--take", help="The recording to pose, for --view.")
+    ] = None,
+    actor: Annotated[
+        Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address of the page.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port of the page, or the next free one.")] = 8080,
 ) -> None:
-    """Find the most probable whole pose given a few controls."""
+    """Find the most probable whole pose given a few controls; or pose with sliders (--view)."""
+    if view:
+        from facert.cli.pose_view import Files, open_page
+
+        files = Files(rig, take, model, actor, output, target, shapes)
+        return open_page(files, overwrite, host, port)
+    if not wanted:
+        raise typer.BadParameter("give values with --set NAME=VALUE, or --view for sliders")
+    model = model or DEFAULT_MODEL
     given = _parse(wanted)
     if output is not None and output.exists() and not overwrite:
         raise OutputExistsError(output)

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from facert.cli import console
+from facert.cli.batch import carry_out, plan
+from facert.cli.options import (
+    CONTROLS,
+    ENDING,
+    JOBS,
+    NO_DETECT,
+    NO_SMOOTH,
+    OUT_DIR,
+    chosen_handling,
+)
 from facert.cli.train import DEFAULT_MODEL
-from facert.errors import OutputExistsError, reading
+from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data import Take
+    from facert.handling import Handling
+    from facert.retargeter import Retargeter
 
 
 class Mode(StrEnum):
@@ -24,11 +38,12 @@ class Mode(StrEnum):
 
 
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Take to retarget.")],
-    output: Annotated[
-        Path,
+    paths: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="OUT", help="Result: .h5, .csv, or .livelink.csv for ARKit controls."
+            metavar="IN OUT",
+            help="Take to retarget, and result: .h5, .csv, .json, or .livelink.csv for ARKit "
+            "controls. With --out-dir: any number of takes, or folders of takes.",
         ),
     ],
     model: Annotated[
@@ -37,34 +52,101 @@ def command(
     mode: Annotated[
         Mode, typer.Option(help="All frames at once, or one after the other as in a live stream.")
     ] = Mode.offline,
+    neutral: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FRAMES",
+            help="Frames in which the actor rests, as 12 or 0..20: takes out what differs there "
+            "from the training take.",
+        ),
+    ] = None,
+    controls: CONTROLS = None,
+    sigma: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Standard deviation of the capture noise in the take's units; else estimated.",
+        ),
+    ] = None,
+    no_detect: NO_DETECT = False,
+    no_smooth: NO_SMOOTH = False,
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several is the truth.")
     ] = None,
+    out_dir: OUT_DIR = None,
+    ending: ENDING = ".h5",
+    jobs: JOBS = 1,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an existing output file.")
     ] = False,
 ) -> None:
     """Write the character's parameters for every frame of a take."""
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
+    todo = plan(paths, out_dir, ending, overwrite)
+    handling = partial(
+        chosen_handling,
+        controls=controls,
+        no_detect=no_detect,
+        no_smooth=no_smooth,
+        sigma=sigma,
+        neutral=neutral,
+    )
+    work = partial(
+        _retarget, model=model, mode=mode, handling=handling, target=target, overwrite=overwrite
+    )
+    carry_out(todo, work, jobs, overwrite)
+
+
+def _retarget(
+    source: Path,
+    output: Path,
+    *,
+    model: Path,
+    mode: Mode,
+    handling: Callable[[Retargeter], Handling],
+    target: str | None,
+    overwrite: bool,
+) -> None:
+    """One take."""
     import time
 
     import facert
 
-    retargeter = facert.load(model)
+    retargeter = _loaded(model.resolve(), _stamp(model))
     take = facert.read_take(source, target=target)
     began = time.perf_counter()
     with reading(source):
-        result = retargeter.retarget(take, mode.value)
+        result = retargeter.retarget(take, mode.value, handling(retargeter))
     seconds = time.perf_counter() - began
     facert.write_take(result, output, overwrite)
     console.log.info(
         "%d frames in %.2f s (%.3f ms a frame)", len(take), seconds, 1e3 * seconds / len(take)
     )
     console.out.print(f"wrote {output}", markup=False)
+    _tell_error(take, result, retargeter)
+
+
+@lru_cache(maxsize=1)
+def _loaded(model: Path, _stamp: tuple[int, int]) -> Retargeter:
+    """Read once a process, however many takes there are, until the file changes."""
+    import facert
+
+    return facert.load(model)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """What changes with a file; nothing where there is none, which reading will tell."""
+    try:
+        found = path.stat()
+    except OSError:
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
+def _tell_error(take: Take, result: Take, retargeter: Retargeter) -> None:
+    """RMS over the poses that the input held, but for those that the model was trained on."""
     unseen = retargeter.without_known(take)
     if len(take.labels) and not len(unseen.labels):
-        console.log.info("the poses in the input are those it was trained on: no error to tell")
+        console.log.info("no pose in the input that it was surely not trained on: no error to tell")
     else:
         _print_errors(unseen, result)
 

@@ -32,6 +32,13 @@ def command(
         str,
         typer.Option(metavar="FRAME|mean", help="Frame whose head pose all get, counted from 0."),
     ] = "mean",
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TAKE",
+            help="A take of the same actor that was stabilised before, for the same head pose.",
+        ),
+    ] = None,
     no_detect: Annotated[
         bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
     ] = False,
@@ -50,11 +57,14 @@ def command(
         raise OutputExistsError(output)
     from facert.cleaning.stabilisation import stabilise
     from facert.cli.cleaned_take import read_observed, write_beside
+    from facert.io.formats import read_take_file
 
-    frame = _frame(reference)
+    if like is not None and reference != "mean":
+        raise typer.BadParameter("--like and --reference both tell the head pose: give one")
+    pose = _frame(reference) if like is None else read_take_file(like, target)
     take = read_observed(source, target, no_detect)
     with reading(source):
-        found = stabilise(take, _names(stable), frame)
+        found = stabilise(take, _names(stable), pose)
     if found.interpolated.any():
         console.log.warning(
             "%d frames show fewer than three stable markers: head motion interpolated",

@@ -97,7 +97,7 @@ def _posed(take: Take, have: str) -> Sequence[int] | IntArray | Retargeter:
 
 
 def _model(path: str) -> Retargeter:
-    from facert.retargeter import load
+    from facert.model_file import load
 
     if not path.endswith(".safetensors"):
         raise typer.BadParameter("--have takes the word labels, or a model (.safetensors)")

@@ -16,6 +16,7 @@ from facert.settings import Settings
 if TYPE_CHECKING:
     from facert.data import Take
     from facert.optim.monitor import Monitor
+    from facert.regions.nouns import Regions
     from facert.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")
@@ -66,6 +67,26 @@ def command(
     optimizer: Annotated[
         str | None, _setting("optimizer", "Of the shared models: lbfgs, or scg (the paper's).")
     ] = None,
+    regions: Annotated[
+        str | None,
+        _setting(
+            "regions",
+            "Learn parts of the face apart: auto, or a TOML file as facert regions prints it.",
+            "the face as a whole",
+        ),
+    ] = None,
+    neutral: Annotated[
+        str | None,
+        _setting(
+            "neutral", "Frames in which the actor rests, as 12 or 0..20.", "the smallest pose"
+        ),
+    ] = None,
+    no_detect: Annotated[
+        bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
+    ] = False,
+    no_smooth: Annotated[
+        bool, typer.Option("--no-smooth", help="Learn from every frame as it was measured.")
+    ] = False,
     seed: Annotated[int | None, _setting("seed", "For every random choice.")] = None,
     device: Annotated[
         str | None, _setting("device", "cpu or, for the shared models, cuda.")
@@ -99,6 +120,10 @@ def command(
         "sigma_c": sigma_c,
         "limits": limits,
         "optimizer": optimizer,
+        "neutral": neutral,
+        "detect": False if no_detect else None,
+        "smooth": False if no_smooth else None,
+        "regions": _regions(regions),
         "seed": seed,
         "device": device,
     }
@@ -109,9 +134,9 @@ def command(
     from facert.methods import method_class
 
     settings = _settings(config, options)
-    stepwise = method_class(settings.method).stepwise
+    stepwise = method_class(settings.method).stepwise and settings.regions is None
     if not stepwise:
-        _warn_of_idle_options(settings.method, resume, curve)
+        _warn_of_idle_options(settings, resume, curve)
     checkpoint = CheckpointFile(checkpoint_path(output), resume) if stepwise else None
     # An interrupted run leaves a model, and a checkpoint to continue from.
     continues = checkpoint is not None and checkpoint.continues
@@ -119,6 +144,7 @@ def command(
     if output.exists() and not overwrite_model:
         raise OutputExistsError(output)
     data = _read(take, target)
+    _check_regions(regions, settings.regions, data)
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
@@ -146,12 +172,28 @@ def _settings(config: Path | None, options: dict[str, Any]) -> Settings:
         return settings.with_changes({k: v for k, v in options.items() if v is not None})
 
 
-def _warn_of_idle_options(method: str, resume: bool, curve: Path | None) -> None:
-    """Say which options do nothing with a method that does not train step by step."""
+def _regions(given: str | None) -> Regions | str | None:
+    """Of the option: the word auto, or what is in a file."""
+    from facert.io.regions import read_regions
+    from facert.regions.nouns import AUTO
+
+    return given if given in (AUTO, None) else read_regions(Path(given))
+
+
+def _check_regions(given: str | None, regions: Regions | str | None, take: Take) -> None:
+    """Refuse regions that do not fit the take, with the name of the file that they are in."""
+    if regions is not None and not isinstance(regions, str) and take.controls is not None:
+        with reading(given or "the settings"):
+            regions.matched(take.source.names, take.controls.names)
+
+
+def _warn_of_idle_options(settings: Settings, resume: bool, curve: Path | None) -> None:
+    """Say which options do nothing where nothing is trained step by step."""
     idle = [name for name, given in (("--resume", resume), ("--log", curve)) if given]
     if idle:
         options = " and ".join(idle)
-        console.log.warning("%s learns in one go: nothing to do for %s", method, options)
+        learner = settings.method if settings.regions is None else f"{settings.method} in regions"
+        console.log.warning("%s learns in one go: nothing to do for %s", learner, options)
 
 
 def _require_output(output: Path, curve: Path | None) -> None:

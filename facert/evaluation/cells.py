@@ -15,6 +15,7 @@ import numpy as np
 from facert.data import Take
 from facert.errors import FacertError
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
+from facert.handling import AS_IT_IS
 from facert.metrics import Scores, score
 from facert.settings import Settings
 from facert.threads import threads_for
@@ -100,13 +101,18 @@ def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:
 
 
 def cell_settings(problem: Problem, cell: Cell, settings: Settings) -> Settings:
-    """The settings with which a cell is trained: all labels and unlabelled data of its draw."""
+    """The settings with which a cell is trained: all labels and unlabelled data of its draw.
+
+    Frames are drawn at random, so each is taken as it was measured.
+    """
     return replace(
         settings,
         method=cell.method,
         labels=None,
         unlabelled=cell.unlabelled,
         seed=problem.protocol.seed + cell.repeat,
+        detect=False,
+        smooth=False,
     )
 
 
@@ -116,7 +122,7 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
     began = time.perf_counter()
     retargeter = train(training, settings)
     trained = time.perf_counter()
-    result: Take = retargeter.retarget(frames)
+    result: Take = retargeter.retarget(frames, handling=AS_IT_IS)
     ended = time.perf_counter()
     assert result.params is not None  # retarget poses every frame
     errors = result.params - true_poses(problem, chosen)

@@ -299,7 +299,7 @@ def _too_short(labels: int, unlabelled: int, animated: bool, posed: int) -> Inpu
         "/target/params",
         f"posed frames for {', '.join(parts)} and a test",
         f"{posed} to draw from",
-        "Ask for fewer labels or fewer unlabelled frames, or give a longer take.",
+        "Ask for fewer labels or fewer unlabelled frames (--unlabelled 0), or pose more.",
     )
 
 

@@ -1,18 +1,12 @@
-"""Cholesky factorisation with a jitter ladder that reports itself."""
+"""Cholesky factorisation of torch's tensors, with the jitter ladder of `facert.gp.jitter`."""
 
 from __future__ import annotations
-
-import logging
 
 import torch
 from torch import Tensor
 
 from facert.errors import NumericalError
-
-log = logging.getLogger(__name__)
-
-# Relative to the mean of the diagonal. The first rung is the matrix as it is.
-JITTER_LADDER = (0.0, 1e-12, 1e-10, 1e-8, 1e-6)
+from facert.gp.jitter import climb
 
 
 def cholesky(K: Tensor) -> Tensor:
@@ -41,14 +35,10 @@ def cholesky(K: Tensor) -> Tensor:
     # Jitter cannot mend NaN, so look for it before the ladder is tried.
     if not torch.isfinite(K).all():
         raise NumericalError("the kernel matrix holds NaN or infinity")
-    scale = float(K.diagonal().mean())
-    for rung in JITTER_LADDER[1:]:
-        jitter = rung * scale
-        factor, info = torch.linalg.cholesky_ex(K + jitter * torch.eye(len(K)).to(K))
-        if not info.item():
-            log.warning("added %.1e to the diagonal of a %d x %d kernel", jitter, *K.shape)
-            return factor
-    raise NumericalError(
-        f"a {len(K)} x {len(K)} kernel matrix is not positive definite, even with "
-        f"{jitter:.1e} on its diagonal: raise the noise floor"
-    )
+
+    def factorise(jitter: float) -> Tensor | None:
+        L: Tensor
+        L, info = torch.linalg.cholesky_ex(K + jitter * torch.eye(len(K)).to(K))
+        return None if info.item() else L
+
+    return climb(factorise, len(K), float(K.diagonal().mean()))

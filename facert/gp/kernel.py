@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from facert.data import FloatArray
 
@@ -39,9 +37,9 @@ class Kernel:
     noise: float
 
     @classmethod
-    def from_log(cls, log_kernel: Tensor, noise_floor: float) -> Kernel:
+    def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Kernel:
         """From (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
-        variance, inverse_width, excess = np.exp(log_kernel.detach().cpu().numpy())
+        variance, inverse_width, excess = np.exp(log_kernel)
         return cls(float(variance), float(inverse_width), float(excess) + noise_floor)
 
     @property
@@ -66,7 +64,7 @@ class Kernel:
         return K
 
 
-def initial_log_kernel() -> Tensor:
+def initial_log_kernel() -> FloatArray:
     """Log parameters that give the paper's initial {1, 1, 100}, with the floor beside it."""
     theta1, theta2, theta3 = INITIAL_THETA
-    return torch.tensor([theta1, theta2, 1.0 / theta3], dtype=torch.float64).log()
+    return np.log([theta1, theta2, 1.0 / theta3])

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from facert.data import FloatArray
-from facert.gp.cholesky import cholesky
+from facert.gp.jitter import whitener
 from facert.gp.kernel import Kernel
 
 
@@ -23,11 +22,11 @@ class PosteriorPoint:
     variance : array, shape (B,)
         σ², Eq. (17), the same for every column of the observations.
     offsets : array, shape (B, N, q)
-        z - z_i for every training position.
+        z - z_i for every position that predictions are made from.
     k : array, shape (B, N)
-        k(z), the kernel against the training positions.
+        k(z), the kernel against these positions.
     whitened : array, shape (B, N)
-        L⁻¹ k, where L Lᵀ = K.
+        T k; for an exact process T = L⁻¹, where L Lᵀ = K.
     """
 
     mean: FloatArray
@@ -37,34 +36,39 @@ class PosteriorPoint:
     whitened: FloatArray
 
 
-class Posterior:
-    """The process given its training data, D columns of observations that share one kernel.
+class Predictor:
+    """A process whose mean is kᵀα and whose variance is θ1 + θ3⁻¹ - |T k|².
 
     Parameters
     ----------
     Z : array, shape (N, q)
-        Training positions.
-    X : array, shape (N, D)
-        Observations, with mean zero.
+        Positions that k is taken against: of the training data, or inducing ones.
+    whitener : array, shape (N, N)
+        T. For an exact process TᵀT = K⁻¹; for a sparse one see `facert.gp.sparse_posterior`.
+    alpha : array, shape (N, D)
+        α.
     kernel : Kernel
         Fixed parameters.
     """
 
-    def __init__(self, Z: FloatArray, X: FloatArray, kernel: Kernel) -> None:
-        self.Z, self.X, self.kernel = Z, X, kernel
-        L = cholesky(torch.from_numpy(kernel.gram(Z)))
-        identity = torch.eye(len(Z), dtype=torch.float64)
-        L_inverse: FloatArray = torch.linalg.solve_triangular(L, identity, upper=False).numpy()
-        alpha = L_inverse.T @ (L_inverse @ X)
-        # [L⁻ᵀ | K⁻¹ X]: one product with k gives variance and mean. |L⁻¹k|² keeps far more digits
+    def __init__(
+        self, Z: FloatArray, whitener: FloatArray, alpha: FloatArray, kernel: Kernel
+    ) -> None:
+        self.Z, self.kernel = Z, kernel
+        # [Tᵀ | α]: one product with k gives variance and mean. |T k|² keeps far more digits
         # than kᵀK⁻¹k, which matters where the noise is small against θ1.
-        self.stacked: FloatArray = np.ascontiguousarray(np.hstack([L_inverse.T, alpha]))
-        self._L_inverse = np.ascontiguousarray(L_inverse)
+        self.stacked: FloatArray = np.ascontiguousarray(np.hstack([whitener.T, alpha]))
+        self.whitener = np.ascontiguousarray(whitener)
 
     @property
     def alpha(self) -> FloatArray:
-        """K⁻¹ X, (N, D)."""
+        """α, K⁻¹ X of an exact process, (N, D)."""
         return self.stacked[:, len(self.Z) :]
+
+    @property
+    def columns(self) -> int:
+        """D, the columns of the observations."""
+        return int(self.stacked.shape[1] - len(self.Z))
 
     def predict(self, z: FloatArray) -> PosteriorPoint:
         """Mean and variance of a new observation at z (B, q), noise included."""
@@ -80,24 +84,64 @@ class Posterior:
         return PosteriorPoint(mean, variance, offsets, k, whitened)
 
     def solve(self, at: PosteriorPoint) -> FloatArray:
-        """K⁻¹ k, (B, N)."""
-        return at.whitened @ self._L_inverse
+        """TᵀT k, K⁻¹ k of an exact process, (B, N)."""
+        return at.whitened @ self.whitener
 
-    def jacobians(self, at: PosteriorPoint) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Derivatives of k, of L⁻¹ k and of the mean with respect to z.
+    def jacobians(
+        self, at: PosteriorPoint, out: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives of k, of T k and of the mean with respect to z.
+
+        Parameters
+        ----------
+        at : PosteriorPoint
+            B positions.
+        out : array, shape (B q or more, N + D), optional
+            Where H and J are kept: fresh memory of that size costs as much as the products.
 
         Returns
         -------
         G : array, shape (B, q, N)
             ∂k_i/∂z = -θ2 (z - z_i) k_i.
         H : array, shape (B, q, N)
-            G L⁻ᵀ.
+            G Tᵀ.
         J : array, shape (B, q, D)
             ∂μ/∂z.
         """
         n = len(self.Z)
-        G = (at.offsets * (-self.kernel.inverse_width * at.k)[:, :, None]).transpose(0, 2, 1)
-        G = np.ascontiguousarray(G)
+        G = self._kernel_jacobian(at)
         batch, q, _ = G.shape
-        product = (G.reshape(-1, n) @ self.stacked).reshape(batch, q, -1)
+        place = None if out is None else out[: batch * q]
+        product = np.matmul(G.reshape(-1, n), self.stacked, out=place).reshape(batch, q, -1)
         return G, product[:, :, :n], product[:, :, n:]
+
+    def mean_jacobian(self, at: PosteriorPoint) -> FloatArray:
+        """∂μ/∂z alone, J of `jacobians`, (B, q, D)."""
+        G = self._kernel_jacobian(at)
+        batch, q, n = G.shape
+        J: FloatArray = (G.reshape(-1, n) @ self.alpha).reshape(batch, q, -1)
+        return J
+
+    def _kernel_jacobian(self, at: PosteriorPoint) -> FloatArray:
+        """∂k/∂z, G of `jacobians`, (B, q, N)."""
+        G = (at.offsets * (-self.kernel.inverse_width * at.k)[:, :, None]).transpose(0, 2, 1)
+        return np.ascontiguousarray(G)
+
+
+class Posterior(Predictor):
+    """The process given its training data, D columns of observations that share one kernel.
+
+    Parameters
+    ----------
+    Z : array, shape (N, q)
+        Training positions.
+    X : array, shape (N, D)
+        Observations, with mean zero.
+    kernel : Kernel
+        Fixed parameters.
+    """
+
+    def __init__(self, Z: FloatArray, X: FloatArray, kernel: Kernel) -> None:
+        self.X = X
+        L_inverse = whitener(kernel.gram(Z))
+        super().__init__(Z, L_inverse, L_inverse.T @ (L_inverse @ X), kernel)

@@ -10,6 +10,7 @@ from facert.data import FloatArray, IntArray
 
 # Added to the local Gram matrix, relative to its trace, when neighbours are nearly dependent.
 REGULARISATION = 1e-3
+CHUNK = 512  # rows solved together; bounds the memory at CHUNK * k * d doubles
 
 
 def nearest_neighbours(U: FloatArray, k: int) -> IntArray:
@@ -40,17 +41,24 @@ def reconstruction_weights(U: FloatArray, k: int) -> sparse.csr_array:
     """
     n = len(U)
     neighbours = nearest_neighbours(U, k)
-    differences = U[neighbours] - U[:, None, :]
+    chunks = [slice(first, first + CHUNK) for first in range(0, n, CHUNK)]
+    weights = np.concatenate([_local_weights(U[rows], U[neighbours[rows]]) for rows in chunks])
+    k = neighbours.shape[1]
+    rows = np.repeat(np.arange(n), k)
+    return sparse.csr_array((weights.ravel(), (rows, neighbours.ravel())), shape=(n, n))
+
+
+def _local_weights(points: FloatArray, neighbours: FloatArray) -> FloatArray:
+    """Eq. (8) for points (b, d) with neighbours (b, k, d): weights (b, k) that sum to 1."""
+    differences = neighbours - points[:, None, :]
     gram = differences @ differences.transpose(0, 2, 1)
     trace = np.trace(gram, axis1=1, axis2=2)
     # All neighbours may coincide with the point; any weights rebuild it then.
     ridge = np.where(trace > 0, REGULARISATION * trace, 1.0)
-    k = neighbours.shape[1]
-    gram[:, np.arange(k), np.arange(k)] += ridge[:, None]
-    weights = np.linalg.solve(gram, np.ones((n, k, 1)))[:, :, 0]
-    weights /= weights.sum(axis=1, keepdims=True)
-    rows = np.repeat(np.arange(n), k)
-    return sparse.csr_array((weights.ravel(), (rows, neighbours.ravel())), shape=(n, n))
+    count = np.arange(neighbours.shape[1])
+    gram[:, count, count] += ridge[:, None]
+    weights = np.linalg.solve(gram, np.ones((*gram.shape[:2], 1)))[:, :, 0]
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def constraint_matrix(X: FloatArray, Y: FloatArray, labelled: int, k: int) -> sparse.csr_array:

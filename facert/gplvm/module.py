@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import torch
 from scipy import sparse
@@ -12,6 +10,8 @@ from torch import Tensor, nn
 from facert.data import FloatArray
 from facert.gp.kernel import Kernel, initial_log_kernel
 from facert.gp.likelihood import compact_factor, negative_log_likelihood
+from facert.gp.posterior import Posterior, Predictor
+from facert.gplvm.prior import half_square, latent_precision
 
 
 class SharedGPLVM(nn.Module):
@@ -57,23 +57,19 @@ class SharedGPLVM(nn.Module):
         self.labelled = labelled
         self.columns_x, self.columns_y = X.shape[1], Y.shape[1]
         self.rows_x = len(X)
+        self.entries = X.size + Y.size
         self.noise_floor_x, self.noise_floor_y = noise_floor_x, noise_floor_y
 
         self.Z = nn.Parameter(torch.from_numpy(np.array(Z, dtype=np.float64, order="C")))
-        self.log_kernel_x = nn.Parameter(initial_log_kernel())
-        self.log_kernel_y = nn.Parameter(initial_log_kernel())
+        self.log_kernel_x = nn.Parameter(torch.from_numpy(initial_log_kernel()))
+        self.log_kernel_y = nn.Parameter(torch.from_numpy(initial_log_kernel()))
 
-        # L = MᵀM + I, Eq. (5).
-        precision = np.eye(len(Z)) if M is None else (M.T @ M).toarray() + np.eye(len(Z))
+        precision, self._prior_constant = latent_precision(M, *self.Z.shape)
         rows_y = np.r_[:labelled, len(X) : len(Z)]
-        self.register_buffer("precision", torch.from_numpy(precision))
+        self.register_buffer("precision", precision)
         self.register_buffer("factor_x", compact_factor(torch.from_numpy(np.array(X))))
         self.register_buffer("factor_y", compact_factor(torch.from_numpy(np.array(Y))))
         self.register_buffer("rows_y", torch.from_numpy(rows_y))
-        _, log_determinant = np.linalg.slogdet(precision)
-        self._prior_constant = 0.5 * (self.Z.numel() * math.log(2 * math.pi)) - 0.5 * (
-            self.Z.shape[1] * float(log_determinant)
-        )
 
     def source_energy(self) -> Tensor:
         """-log P(X|Z), Eq. (1), over labelled and source-only rows."""
@@ -97,7 +93,7 @@ class SharedGPLVM(nn.Module):
 
     def prior_energy(self) -> Tensor:
         """-log P(Z), Eq. (5)."""
-        return 0.5 * ((self.precision @ self.Z) * self.Z).sum() + self._prior_constant
+        return half_square(self.Z, self.precision) + self._prior_constant
 
     def forward(self) -> Tensor:
         """-log P(X|Z) P(Y|Z) P(Z), what training minimises, Eq. (4)."""
@@ -106,12 +102,12 @@ class SharedGPLVM(nn.Module):
     @property
     def kernel_x(self) -> Kernel:
         """The source view's kernel with its present parameters."""
-        return Kernel.from_log(self.log_kernel_x, self.noise_floor_x)
+        return Kernel.from_log(self.log_kernel_x.detach().cpu().numpy(), self.noise_floor_x)
 
     @property
     def kernel_y(self) -> Kernel:
         """The target view's kernel with its present parameters."""
-        return Kernel.from_log(self.log_kernel_y, self.noise_floor_y)
+        return Kernel.from_log(self.log_kernel_y.detach().cpu().numpy(), self.noise_floor_y)
 
     @property
     def latents_x(self) -> FloatArray:
@@ -122,3 +118,11 @@ class SharedGPLVM(nn.Module):
     def latents_y(self) -> FloatArray:
         """Latent coordinates of the target view's rows, (l + n, q)."""
         return self.Z.detach()[self.rows_y].cpu().numpy()
+
+    def source_posterior(self, X: FloatArray) -> Predictor:
+        """The source view given its observations (l + m, d_x), for source mapping."""
+        return Posterior(self.latents_x, X, self.kernel_x)
+
+    def target_posterior(self, Y: FloatArray) -> Predictor:
+        """The target view given its observations (l + n, d_y), for target mapping."""
+        return Posterior(self.latents_y, Y, self.kernel_y)

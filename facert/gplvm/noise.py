@@ -18,6 +18,8 @@ from facert.settings import Settings
 # Normalised units. Below the first, source mapping begins to stick to the training latents (their
 # predictive variance vanishes, see facert.gp.kernel); above the second, small motion is lost.
 LEAST, MOST = 0.03, 0.1
+STEP = 0.3
+"""How far a face moves from frame to frame when nobody knows, normalised units."""
 
 
 def expected_noise(X: FloatArray, latent_dim: int) -> float:
@@ -41,7 +43,7 @@ def expected_noise(X: FloatArray, latent_dim: int) -> float:
 
 
 def with_noise(settings: Settings, X: FloatArray) -> Settings:
-    """The settings with the noise of the source filled in where it is left open.
+    """The settings with the noise and the motion of the source filled in where they are open.
 
     Parameters
     ----------
@@ -55,5 +57,8 @@ def with_noise(settings: Settings, X: FloatArray) -> Settings:
         sigma_c = expected_noise(X, settings.latent_dim)
     floor = settings.source_noise_floor
     return replace(
-        settings, sigma_c=sigma_c, source_noise_floor=sigma_c**2 if floor is None else floor
+        settings,
+        sigma_c=sigma_c,
+        source_noise_floor=sigma_c**2 if floor is None else floor,
+        sigma_t=STEP if settings.sigma_t is None else settings.sigma_t,
     )

@@ -10,8 +10,9 @@ It is quadratic in x, whose minimum x* = μ - σ_p² w ∘ (μ - b) with w_d = 1
     F(z) = 1/2 Σ_d w_d (μ_d - b_d)² + d_x/2 log σ_p² + |z|²/2,
 
 a problem in q dimensions. `solve` runs Newton's method with the exact Hessian on many frames at
-once. Writing r = μ - b, s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and
-a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s), a' = ∂a/∂s = Σ w³ r² - d_x/(2s²):
+once, and `follow` on one after its predecessor (`facert.gplvm.frame_mapping`). Writing r = μ - b,
+s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s),
+a' = ∂a/∂s = Σ w³ r² - d_x/(2s²):
 
     ∇F  = J (w r) + a g + z
     ∇²F = J diag(w) Jᵀ + a' g gᵀ - u gᵀ - g uᵀ - 2 a G K⁻¹ Gᵀ + Σ_i e_i ∇²k_i + I,
@@ -26,15 +27,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data import BoolArray, FloatArray
-from facert.gp.posterior import Posterior, PosteriorPoint
+from facert.gp.posterior import PosteriorPoint, Predictor
+from facert.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping
 
 MAX_ITERATIONS = 200  # in all; most frames need three or four
-# Newton decrement (nats) below which a frame counts as solved; the energy is a log-probability.
-DECREMENT = 1e-9
-# Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
-ROUNDING = 1e-7
+SHIFTED_DECREMENT = 1e-9  # a shifted step foretells little, however much is left
 SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
-CHUNK = 256  # frames solved together; bounds the memory at about CHUNK * N * q doubles
+CHUNK = 128  # frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles
 
 
 @dataclass(frozen=True)
@@ -53,10 +52,14 @@ class Observation:
     variance: FloatArray
 
     @classmethod
-    def of(cls, X: FloatArray, sigma_c: float) -> Observation:
-        """Frames (B, d_x) with measurement noise sigma_c, Eq. (13); NaN: not observed."""
+    def of(cls, X: FloatArray, sigma_c: float, doubt: FloatArray | None = None) -> Observation:
+        """Frames (B, d_x) with measurement noise sigma_c, Eq. (13); NaN: not observed.
+
+        Numbers that were not measured but filled in have so much variance more, `doubt` (B, d_x).
+        """
         seen = ~np.isnan(X)
-        return cls(np.where(seen, X, 0.0), np.where(seen, sigma_c**2, np.inf))
+        variance = sigma_c**2 + (0.0 if doubt is None else np.nan_to_num(doubt))
+        return cls(np.where(seen, X, 0.0), np.where(seen, variance, np.inf))
 
     def following(self, previous: FloatArray, sigma_t: float) -> Observation:
         """With the pull of the previous cleaned frame, (B, d_x), added: Eq. (14)."""
@@ -81,7 +84,8 @@ class Mapped:
     x : array, shape (B, d_x)
         x*, the most probable source.
     hessian : array, shape (B, q, q)
-        ∇²F at z*; its inverse is the covariance of z in the Laplace approximation.
+        ∇²F at z*, or a tiny last step before; its inverse is the covariance of z in the Laplace
+        approximation.
     energy : array, shape (B,)
         F(z*).
     converged : array of bool, shape (B,)
@@ -102,7 +106,6 @@ class _Expansion:
     energy: FloatArray
     gradient: FloatArray
     hessian: FloatArray
-    x: FloatArray
 
 
 class SourceMapping:
@@ -110,35 +113,31 @@ class SourceMapping:
 
     Parameters
     ----------
-    posterior : Posterior
+    posterior : Predictor
         The source view, X given Z.
     """
 
-    def __init__(self, posterior: Posterior) -> None:
+    def __init__(self, posterior: Predictor) -> None:
         self.posterior = posterior
         # F at every training latent is the search for a start: keep what does not change.
         at = posterior.predict(posterior.Z)
-        self._train_mean = at.mean
-        self._train_variance = at.variance
-        self._train_energy = 0.5 * posterior.X.shape[1] * np.log(at.variance) + 0.5 * np.sum(
+        self._train_means = np.hstack([0.5 * at.mean**2, -at.mean]).T.copy()
+        self._train_variance = float(at.variance.mean())
+        self._train_energy = 0.5 * posterior.columns * np.log(at.variance) + 0.5 * np.sum(
             posterior.Z**2, axis=1
         )
+        self._frame = FrameMapping(posterior)
 
     def start(self, observed: Observation) -> FloatArray:
-        """The training latent of least energy for each frame, (B, q).
-
-        σ_p² is taken as its mean over the training latents, where it varies little.
-        """
-        w = 1.0 / (self._train_variance.mean() + observed.variance)
-        mismatch = w @ (self._train_mean**2).T - 2.0 * (w * observed.mean) @ self._train_mean.T
-        best = (0.5 * mismatch + self._train_energy).argmin(axis=1)
-        return np.asarray(self.posterior.Z[best])
+        """The training latent of least energy for each frame, (B, q)."""
+        # σ_p² varies little between the training latents: its mean serves all.
+        w = 1.0 / (self._train_variance + observed.variance)
+        energies = np.hstack([w, w * observed.mean]) @ self._train_means + self._train_energy
+        return np.asarray(self.posterior.Z[energies.argmin(axis=1)])
 
     def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
         """F(z) for B frames, (B,)."""
-        at = self.posterior.predict(z)
-        w = 1.0 / (at.variance[:, None] + observed.variance)
-        return _energy(z, at, w, at.mean - observed.mean)
+        return self._look(z, observed)[0]
 
     def solve(self, observed: Observation, *starts: FloatArray) -> Mapped:
         """Minimise F for each frame on its own, beginning at the best of the starts.
@@ -155,8 +154,11 @@ class SourceMapping:
         Mapped
             All frames; solved in chunks, so that memory stays bounded.
         """
+        posterior = self.posterior
+        frames = min(CHUNK, len(observed.mean))
+        scratch = np.empty((frames * posterior.Z.shape[1], posterior.stacked.shape[1]))
         chunks = [
-            self._newton(observed[rows], [start[rows] for start in starts])
+            self._newton(observed[rows], [start[rows] for start in starts], scratch)
             for rows in (
                 slice(first, first + CHUNK) for first in range(0, len(observed.mean), CHUNK)
             )
@@ -170,34 +172,70 @@ class SourceMapping:
             )
         )
 
-    def _newton(self, observed: Observation, starts: list[FloatArray]) -> Mapped:
+    def follow(self, observed: Observation, previous: FloatArray) -> Mapped:
+        """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
+
+        Parameters
+        ----------
+        observed : Observation
+            One frame.
+        previous : array, shape (1, q)
+            z of the frame before.
+        """
+        frame, b, R = self._frame, observed.mean[0], observed.variance[0]
+        (nearest,) = self.start(observed)
+        least = frame.energy(nearest, b, R)
+        found = frame.descend(previous[0], b, R, least)
+        if found is None and frame.energy(previous[0], b, R) > least:
+            found = frame.descend(nearest, b, R)
+        if found is None:
+            return self.solve(observed, previous)
+        return Mapped(
+            found.z[None],
+            found.x[None],
+            found.hessian[None],
+            np.array([found.energy]),
+            np.array([True]),
+        )
+
+    def _newton(
+        self, observed: Observation, starts: list[FloatArray], scratch: FloatArray
+    ) -> Mapped:
         """Newton's method; a shift appears only where a step is rejected, see `_step`."""
         z = self._best_start(observed, starts)
-        at = self._expand(z, observed)
-        energy, gradient, hessian, x = at.energy, at.gradient, at.hessian, at.x
-        shift = np.zeros(len(z))
+        at = self._expand(z, observed, scratch)
+        energy, gradient, hessian = at.energy, at.gradient, at.hessian
+        shift, last = np.zeros(len(z)), np.zeros_like(z)
         converged = np.zeros(len(z), dtype=bool)
 
         active = np.arange(len(z))
         for _ in range(MAX_ITERATIONS):
             step = _step(hessian[active], gradient[active], shift[active])
             descent = np.einsum("bq,bq->b", gradient[active], step)
-            done = np.abs(descent) < DECREMENT
+            done = np.abs(descent) < np.where(shift[active] > 0.0, SHIFTED_DECREMENT, DECREMENT)
             done[done] = ~_leave_saddles(hessian[active], step, descent, done)
-            converged[active[done]] = True
+            converged[active[done]], last[active[done]] = True, step[done]
             active, step, descent = active[~done], step[~done], descent[~done]
             if not len(active):
                 break
-            at = self._expand(z[active] + step, observed[active])
+            at = self._expand(z[active] + step, observed[active], scratch)
             fall = energy[active] - at.energy
             foretold = -descent - 0.5 * np.einsum("bp,bpq,bq->b", step, hessian[active], step)
             better = (descent < 0.0) & (fall >= -ROUNDING)
             good = active[better]
             z[good] += step[better]
             energy[good], gradient[good] = at.energy[better], at.gradient[better]
-            hessian[good], x[good] = at.hessian[better], at.x[better]
+            hessian[good] = at.hessian[better]
             shift[active] = _adapted(shift[active], better, fall, foretold)
-        return Mapped(z, x, hessian, energy, converged)
+        end, x = self._look(z + last, observed)
+        return Mapped(z + last, x, hessian, end, converged)
+
+    def _look(self, z: FloatArray, observed: Observation) -> tuple[FloatArray, FloatArray]:
+        """F and x* at z (B, q)."""
+        at = self.posterior.predict(z)
+        w = 1.0 / (at.variance[:, None] + observed.variance)
+        r = at.mean - observed.mean
+        return _energy(z, at, w, r), at.mean - at.variance[:, None] * w * r
 
     def _best_start(self, observed: Observation, starts: list[FloatArray]) -> FloatArray:
         z = self.start(observed)
@@ -207,13 +245,15 @@ class SourceMapping:
         energies = np.stack([self.energy(candidate, observed) for candidate in candidates])
         return np.asarray(candidates[energies.argmin(axis=0), np.arange(len(z))])
 
-    def _expand(self, z: FloatArray, observed: Observation) -> _Expansion:
-        """F, ∇F, ∇²F and x* at z (B, q), by the formulas at the head of this file."""
+    def _expand(
+        self, z: FloatArray, observed: Observation, scratch: FloatArray | None = None
+    ) -> _Expansion:
+        """F, ∇F and ∇²F at z (B, q), by the formulas at the head of this file."""
         posterior = self.posterior
         theta2 = posterior.kernel.inverse_width
-        d_x = posterior.X.shape[1]
+        d_x = posterior.columns
         at = posterior.predict(z)
-        _, H, J = posterior.jacobians(at)
+        _, H, J = posterior.jacobians(at, scratch)
 
         s = at.variance
         w = 1.0 / (s[:, None] + observed.variance)
@@ -238,13 +278,18 @@ class SourceMapping:
         )
         diagonal = np.arange(z.shape[1])
         hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
-        return _Expansion(_energy(z, at, w, r), gradient, hessian, at.mean - s[:, None] * wr)
+        return _Expansion(_energy(z, at, w, r), gradient, hessian)
 
 
 def _leave_saddles(
     hessian: FloatArray, step: FloatArray, descent: FloatArray, done: BoolArray
 ) -> BoolArray:
     """Which of the frames that are done stand on a saddle; their steps are set to lead off it."""
+    try:
+        np.linalg.cholesky(hessian[done])
+        return np.zeros(np.count_nonzero(done), dtype=bool)
+    except np.linalg.LinAlgError:
+        pass  # one at least: look at all
     values, vectors = np.linalg.eigh(hessian[done])
     saddle = values[:, 0] < 0.0
     rows = np.flatnonzero(done)[saddle]

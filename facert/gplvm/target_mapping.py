@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data import FloatArray
-from facert.gp.posterior import Posterior
+from facert.gp.posterior import Predictor
 from facert.gplvm.source_mapping import CHUNK, Mapped
 
 
-def map_to_target(posterior: Posterior, mapped: Mapped) -> tuple[FloatArray, FloatArray]:
+def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, FloatArray]:
     """Most probable parameters and their standard deviation.
 
     The variance is that of the target view at z* plus what the uncertainty of z* itself brings,
@@ -18,7 +18,7 @@ def map_to_target(posterior: Posterior, mapped: Mapped) -> tuple[FloatArray, Flo
 
     Parameters
     ----------
-    posterior : Posterior
+    posterior : Predictor
         The target view, Y given Z.
     mapped : Mapped
         B frames in latent space.
@@ -32,7 +32,7 @@ def map_to_target(posterior: Posterior, mapped: Mapped) -> tuple[FloatArray, Flo
     for first in range(0, len(mapped.z), CHUNK):
         rows = slice(first, first + CHUNK)
         at = posterior.predict(mapped.z[rows])
-        _, _, J = posterior.jacobians(at)
+        J = posterior.mean_jacobian(at)
         spread = np.einsum("bqd,bqd->bd", J, np.linalg.solve(mapped.hessian[rows], J))
         means.append(at.mean)
         # Where Newton's method gave up the Hessian may be indefinite.

@@ -21,6 +21,7 @@ def train(
     checkpoint_every: int,
     fingerprint: str,
     monitor: Monitor,
+    magnitude: float = 1.0,
 ) -> Result:
     """Minimise the module's output; its parameters are then the best that were found.
 
@@ -40,6 +41,9 @@ def train(
         Identifies the problem: its data and its settings.
     monitor : Monitor
         Watches, keeps checkpoints, knows where an earlier run stopped.
+    magnitude : float
+        The decrease is taken relative to this at least: an objective that passes through zero is
+        no measure of itself.
 
     Returns
     -------
@@ -57,11 +61,15 @@ def train(
             "Train without --resume.",
         )
 
+    def converged() -> bool:
+        value = max(abs(progress.state.value), 1.0)
+        return progress.converged(tolerance * max(magnitude / value, 1.0))
+
     def watch(state: State) -> bool:
         nonlocal progress
         progress = Progress(state, (*progress.curve, state.value))
         monitor.iteration(state)
-        return progress.converged(tolerance)
+        return converged()
 
     status: Status = "iteration limit"
     try:
@@ -69,7 +77,7 @@ def train(
             left = max_iterations - progress.state.iterations
             state = optimiser.advance(objective, progress.state, min(checkpoint_every, left), watch)
             progress = replace(progress, state=state)
-            if progress.converged(tolerance):
+            if converged():
                 status = "converged"
                 break
             if state.stalled:

@@ -1,6 +1,6 @@
 """The one table of file formats for takes and rigs: what a name's ending means.
 
-Meshes at rest and in motion have rooms of their own: `mesh`, `mesh_sequence`, `glb`.
+Meshes at rest and in motion have rooms of their own: `mesh`, `mesh_sequence`, `glb`, `usd`.
 
 =================  =================================  ==========================================
 ending             read                               written
@@ -9,6 +9,11 @@ ending             read                               written
 ``.livelink.csv``  Live Link Face CSV                 poses, else source weights, of ARKit names
 ``.csv``           Live Link Face CSV when the        poses, else the source, as a plain table
                    header says so; else a table
+``.json``          curves, as Audio2Face writes       poses, else source weights
+``.txt``           Face Cap recording                 -
+``.c3d .trc``      markers                            -
+``.glb .gltf``     a rig of morph targets; the take   -
+                   of their animation
 ``.npz``           take or rig, by its keys           -
 a folder           OBJ files: a rig                   -
 =================  =================================  ==========================================
@@ -16,11 +21,19 @@ a folder           OBJ files: a rig                   -
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 from facert.data import Rig, Take
 from facert.errors import InputError, reading
 from facert.io import npz
+from facert.io.c3d import read_c3d
+from facert.io.curves import read_curves, write_curves
+from facert.io.facecap import read_facecap
+from facert.io.gltf_rig import read_gltf_rig
+from facert.io.gltf_take import holds_animation, read_gltf_take
 from facert.io.hdf5 import open_guarded
 from facert.io.livelink import is_livelink, read_livelink, write_livelink
 from facert.io.obj import read_obj_folder
@@ -29,12 +42,35 @@ from facert.io.rig import read_rig, write_rig
 from facert.io.table import read_table, write_table
 from facert.io.take import read_take, write_take
 from facert.io.text import existing_file, read_header
+from facert.io.trc import read_trc
+
+log = logging.getLogger("facert")
+
+Kind = Literal["take", "rig"]
 
 HDF5_ENDINGS = (".h5", ".hdf5")
+GLTF_ENDINGS = (".glb", ".gltf")
+TAKE_ENDINGS = (*HDF5_ENDINGS, ".csv", ".json", ".txt", ".c3d", ".trc", *GLTF_ENDINGS, ".npz")
+
+_ADVICE = {
+    ".fbx": "Export it as .glb from Blender, Maya or Unreal.",
+    ".bvh": "Export it as .c3d or .trc.",
+    ".mp4": "Track the face first, e.g. with Live Link Face or Face Cap.",
+    ".mov": "Track the face first, e.g. with Live Link Face or Face Cap.",
+    ".obj": "Give the folder with neutral.obj and one OBJ file a shape.",
+    ".safetensors": "This is a model: give it with --model.",
+    ".usd": "facert writes USD and does not read it: export a .glb.",
+    ".usda": "facert writes USD and does not read it: export a .glb.",
+    ".usdc": "facert writes USD and does not read it: export a .glb.",
+}
 
 
 def read_any(
-    path: Path, target: str | None = None, shapes: str | None = None, fps: float | None = None
+    path: Path,
+    target: str | None = None,
+    shapes: str | None = None,
+    fps: float | None = None,
+    kind: Kind | None = None,
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -42,9 +78,12 @@ def read_any(
     ----------
     path : Path
     target, shapes : str, optional
-        Which target, or set of shapes, of an .npz file that holds several.
+        Which target, or set of shapes, of an .npz file that holds several; which animation of a
+        glTF file.
     fps : float, optional
         Frames a second of a file that does not say.
+    kind : {"take", "rig"}, optional
+        What to read of a file that can hold both, as glTF does; by default the rig.
 
     Raises
     ------
@@ -52,19 +91,12 @@ def read_any(
         For an unknown ending, or a file that is not what its ending says.
     """
     path = Path(path)
-    if path.is_dir():
-        return read_obj_folder(path)
-    existing_file(path)
-    ending = path.suffix.lower()
-    if ending in HDF5_ENDINGS:
-        return read_rig(path) if _hdf5_format(path) == RIG_FORMAT else read_take(path)
-    if ending == ".npz" and npz.holds_rig(path):
-        return npz.read_npz_rig(path, shapes)
-    if ending == ".npz":
-        return npz.read_npz_take(path, target, fps)
-    if ending == ".csv":
-        return _read_csv_take(path, fps)
-    raise _unknown_ending(path, ".h5, .hdf5, .csv, .npz, or a folder of .obj files")
+    found: Kind = "rig" if _holds_rig(path) else "take"
+    if path.suffix.lower() in GLTF_ENDINGS:
+        if kind is None and holds_animation(path):
+            log.info("%s: this is the rig; its animation is a take as well", path.name)
+        found = kind or found
+    return _read_rig(path, shapes) if found == "rig" else _read_take(path, target, fps)
 
 
 def read_take_file(path: Path, target: str | None = None, fps: float | None = None) -> Take:
@@ -75,7 +107,7 @@ def read_take_file(path: Path, target: str | None = None, fps: float | None = No
     InputError
         Also when the file holds a rig.
     """
-    found = read_any(path, target=target, fps=fps)
+    found = read_any(path, target=target, fps=fps, kind="take")
     if isinstance(found, Rig):
         raise InputError("file", "a take", "a rig", "Give a performance.", where=str(path))
     return found
@@ -89,7 +121,7 @@ def read_rig_file(path: Path, shapes: str | None = None) -> Rig:
     InputError
         Also when the file holds a take.
     """
-    found = read_any(path, shapes=shapes)
+    found = read_any(path, shapes=shapes, kind="rig")
     if isinstance(found, Take):
         raise InputError("file", "a rig", "a take", "Give a rig.", where=str(path))
     return found
@@ -113,12 +145,14 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
         write_livelink(take, path, overwrite)
     elif ending == ".csv":
         write_table(take, path, overwrite)
+    elif ending == ".json":
+        write_curves(take, path, overwrite)
     else:
-        raise _unknown_ending(path, ".h5, .hdf5, .livelink.csv or .csv")
+        raise unknown_output(path, ".h5, .hdf5, .livelink.csv, .csv or .json")
 
 
 def write_rig_file(rig: Rig, path: Path, overwrite: bool = False) -> None:
-    """Write a rig; HDF5 is the only format for it.
+    """Write a rig; HDF5 is the only format for it here, see `facert.io.glb` for another.
 
     Raises
     ------
@@ -129,13 +163,52 @@ def write_rig_file(rig: Rig, path: Path, overwrite: bool = False) -> None:
     """
     path = Path(path)
     if path.suffix.lower() not in HDF5_ENDINGS:
-        raise _unknown_ending(path, ".h5 or .hdf5 for a rig")
+        raise unknown_output(path, ".h5 or .hdf5 for a rig")
     write_rig(rig, path, overwrite)
 
 
-def _hdf5_format(path: Path) -> str:
-    with open_guarded(path) as file:
-        return file.text_attribute("format")
+def _holds_rig(path: Path) -> bool:
+    """Tell a rig from a take, for whatever can be read."""
+    if path.is_dir():
+        return True
+    existing_file(path)
+    ending = path.suffix.lower()
+    if ending in HDF5_ENDINGS:
+        with open_guarded(path) as file:
+            return file.text_attribute("format") == RIG_FORMAT
+    if ending == ".npz":
+        return npz.holds_rig(path)
+    return ending in GLTF_ENDINGS
+
+
+def _read_take(path: Path, target: str | None, fps: float | None) -> Take:
+    readers: dict[str, Callable[[], Take]] = {
+        ".h5": lambda: read_take(path),
+        ".hdf5": lambda: read_take(path),
+        ".csv": lambda: _read_csv_take(path, fps),
+        ".json": lambda: read_curves(path, fps),
+        ".txt": lambda: read_facecap(path),
+        ".c3d": lambda: read_c3d(path),
+        ".trc": lambda: read_trc(path),
+        ".glb": lambda: read_gltf_take(path, target),
+        ".gltf": lambda: read_gltf_take(path, target),
+        ".npz": lambda: npz.read_npz_take(path, target, fps),
+    }
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise _unknown_input(path)
+    return reader()
+
+
+def _read_rig(path: Path, shapes: str | None) -> Rig:
+    ending = path.suffix.lower()
+    if path.is_dir():
+        return read_obj_folder(path)
+    if ending in HDF5_ENDINGS:
+        return read_rig(path)
+    if ending in GLTF_ENDINGS:
+        return read_gltf_rig(path)
+    return npz.read_npz_rig(path, shapes)
 
 
 def _read_csv_take(path: Path, fps: float | None) -> Take:
@@ -144,6 +217,17 @@ def _read_csv_take(path: Path, fps: float | None) -> Take:
     return read_livelink(path) if livelink else read_table(path, fps)
 
 
-def _unknown_ending(path: Path, known: str) -> InputError:
-    ending = repr(path.suffix) if path.suffix else "none"
-    return InputError("file name's ending", known, ending, "Rename the file.", where=str(path))
+def _unknown_input(path: Path) -> InputError:
+    known = f"{', '.join(TAKE_ENDINGS)}, or a folder of .obj files"
+    advice = _ADVICE.get(path.suffix.lower(), "Export it in one of these formats.")
+    return InputError("kind of file", known, _ending(path), advice, where=str(path))
+
+
+def unknown_output(path: Path, known: str) -> InputError:
+    """What to say of an output whose ending is not among the known ones."""
+    fix = "Choose a name for the output that ends so."
+    return InputError("output's ending", known, _ending(path), fix, where=str(path))
+
+
+def _ending(path: Path) -> str:
+    return repr(path.suffix) if path.suffix else "no ending"

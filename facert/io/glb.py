@@ -21,9 +21,7 @@ from facert.errors import InputError
 from facert.geometry import vertex_normals
 from facert.io.atomic import replacing
 from facert.morphs import Morphs
-
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-"""glTF counts in metres; another or no unit is taken as it is."""
+from facert.units import METRES
 
 _GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}
@@ -75,6 +73,9 @@ class _Buffer:
 def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
     """Write a mesh with morph targets and the animation of their weights, which begins at 0 s.
 
+    glTF counts in metres: a mesh in a known unit is scaled by its node; of another unit or none
+    the numbers stay. A single frame makes no animation: it is how the mesh is to be seen.
+
     Raises
     ------
     InputError
@@ -105,7 +106,8 @@ def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
     if metres != 1.0:
         node["scale"] = [metres] * 3
     mesh = _mesh(morphs, name, buffer)
-    animation = _animation(morphs, name, buffer)
+    moving = len(morphs.time) > 1
+    animations = {"animations": [_animation(morphs, name, buffer)]} if moving else {}
     return {
         "asset": {"version": "2.0", "generator": f"facert {facert.__version__}"},
         "scene": 0,
@@ -113,10 +115,10 @@ def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
         "nodes": [node],
         "meshes": [mesh],
         "materials": [_material(morphs.neutral)],
-        "animations": [animation],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": buffer.size}],
+        **animations,
     }
 
 
@@ -147,7 +149,7 @@ def _mesh(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
     return {
         "name": name,
         "primitives": [primitive],
-        "weights": [0.0] * len(targets),
+        "weights": morphs.weights[0].tolist() if len(morphs.time) == 1 else [0.0] * len(targets),
         "extras": {"targetNames": list(morphs.names)},
     }
 

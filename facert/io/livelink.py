@@ -131,7 +131,11 @@ def format_timecode(ticks: int) -> str:
 def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
     kept = [row for row in rows if _saw_face(row)]
     if len(kept) < len(rows):
-        log.info("dropped %d of %d rows without a face", len(rows) - len(kept), len(rows))
+        log.info(
+            "dropped %d of %d rows without a face: frames are counted without them",
+            len(rows) - len(kept),
+            len(rows),
+        )
     if not kept:
         raise InputError(
             "BlendShapeCount", "rows with a face", "none", "Record again with the face in view."

@@ -235,9 +235,14 @@ def _clock(archive: Archive, frames: int, fps: float | None) -> tuple[FloatArray
     """Time of the frames, and the nominal rate."""
     if "fps" in archive:
         fps = archive.number("fps")
-    if "time" in archive:
-        time = archive.numbers("time")
-        return time, fps or nominal_rate(time)
+    elif "time" in archive:
+        fps = nominal_rate(archive.numbers("time"))
     if not fps:
-        raise InputError("fps", "the rate of the frames", "none", "Store fps, or give --fps.")
-    return np.arange(frames) / fps, fps
+        raise InputError(
+            "fps",
+            "the rate of the frames",
+            "none",
+            "Store fps, or run facert convert with --in-fps.",
+        )
+    time = archive.numbers("time") if "time" in archive else np.arange(frames) / fps
+    return time, fps

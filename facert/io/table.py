@@ -18,6 +18,7 @@ import numpy as np
 from facert.data import FloatArray, IntArray, Source, Take
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
+from facert.io.columns import named_columns
 from facert.io.rate import nominal_rate
 from facert.io.text import check_width, read_csv, to_numbers
 
@@ -31,7 +32,7 @@ def read_table(path: Path, fps: float | None = None) -> Take:
     ----------
     path : Path
     fps : float, optional
-        Frames a second; needed with a column ``frame``, else estimated from the times.
+        Frames a second of a column ``frame``; a column ``time`` tells by itself.
 
     Raises
     ------
@@ -44,12 +45,10 @@ def read_table(path: Path, fps: float | None = None) -> Take:
         clock = _clock_column(header)
         columns = [column for column in range(len(header)) if column != clock]
         names, order = _source_columns([header[column] for column in columns])
-        time = to_numbers(rows, header, [clock])[:, 0]
-        if header[clock].lower() == "frame":
-            time = _seconds(time, fps)
+        time, rate = _clock(to_numbers(rows, header, [clock])[:, 0], header[clock], fps)
         values = to_numbers(rows, header, columns)[:, order]
         source = Source(values if order.ndim == 1 else values.reshape(len(rows), -1, 3), names)
-        return Take(time=time, source=source, fps=fps or nominal_rate(time))
+        return Take(time=time, source=source, fps=rate)
 
 
 def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
@@ -60,7 +59,7 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     OutputExistsError
         When `path` exists and `overwrite` is not set.
     """
-    names, values = _columns(take)
+    names, values = named_columns(take)
     body = io.StringIO()
     np.savetxt(body, np.column_stack([take.time, values]), fmt="%.10g", delimiter=",")
     with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
@@ -81,12 +80,18 @@ def _clock_column(header: Sequence[str]) -> int:
     )
 
 
-def _seconds(frames: FloatArray, fps: float | None) -> FloatArray:
+def _clock(values: FloatArray, column: str, fps: float | None) -> tuple[FloatArray, float]:
+    """Seconds and nominal rate of a column of seconds or of frame numbers."""
+    if column.lower() == "time":
+        return values, nominal_rate(values)
     if fps is None:
         raise InputError(
-            "column frame", "the rate of the frames", "none", "Give --fps, or a column time."
+            "column frame",
+            "the rate of the frames",
+            "none",
+            "Add a column time, or run facert convert with --in-fps.",
         )
-    return frames / fps
+    return values / fps, fps
 
 
 def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:
@@ -107,11 +112,3 @@ def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:
             "Remove it: a take's source is markers or weights, not both.",
         )
     return tuple(whole), np.array([[place[name, axis] for axis in "xyz"] for name in whole])
-
-
-def _columns(take: Take) -> tuple[list[str], FloatArray]:
-    if take.controls is not None and take.params is not None:
-        return list(take.controls.names), take.params
-    if take.source.kind == "weights":
-        return list(take.source.names), take.source.values
-    return [f"{name}.{axis}" for name in take.source.names for axis in "xyz"], take.source.matrix

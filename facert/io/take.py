@@ -144,6 +144,8 @@ def _write_source(file: NewFile, source: Source) -> None:
     file.names("/source/names", source.names)
     if not source.valid.all():
         file.array("/source/valid", source.valid)
+    if source.std is not None:
+        file.array("/source/std", source.std)
 
 
 def _write_target(file: NewFile, take: Take) -> None:

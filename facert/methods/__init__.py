@@ -52,5 +52,12 @@ def method_class(name: str) -> type[Method]:
 
 
 def make_method(settings: Settings) -> Method:
-    """A method by the name in the settings; raises InputError when there is none of that name."""
+    """A method by the name in the settings; raises InputError when there is none of that name.
+
+    With regions, one that has such a method a region; it is ready for `Method.load` alone.
+    """
+    if settings.regions is not None:
+        from facert.methods.regional import Regional
+
+        return Regional(settings)
     return method_class(settings.method)(settings)

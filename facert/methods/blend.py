@@ -29,9 +29,10 @@ import numpy as np
 from scipy.optimize import nnls
 
 from facert.data import FloatArray
+from facert.learned import Arrays
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.factors import FactorMap, Trio, left_out_poses
-from facert.methods.regression import Arrays, Map, Regression
+from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
 from facert.methods.ssgpr import Basis, FeatureProcess
 from facert.metrics import rms

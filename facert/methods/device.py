@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import torch
+from typing import TYPE_CHECKING
 
 from facert.errors import DeviceError
+
+if TYPE_CHECKING:
+    import torch
 
 
 def find_device(name: str) -> torch.device:
@@ -15,6 +18,8 @@ def find_device(name: str) -> torch.device:
     DeviceError
         When it is not there: training never falls back to another device in silence.
     """
+    import torch  # takes its time: not for those that stay on the CPU
+
     try:
         device = torch.device(name)
         if device.type not in ("cpu", "cuda"):

@@ -12,18 +12,18 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-import torch
 
 from facert.data import FloatArray
 from facert.errors import InputError
-from facert.gp.cholesky import cholesky
+from facert.gp.jitter import whitener
 from facert.gp.regression import (
     LINEAR_BOUNDS,
     NO_LINEAR_TERM,
     RegressionKernel,
     maximise_likelihood,
 )
-from facert.methods.regression import DAMAGED, Map, SupervisedRegression
+from facert.learned import DAMAGED
+from facert.methods.regression import Map, SupervisedRegression
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +80,7 @@ class ProcessMap(Map):
     @cached_property
     def _stacked(self) -> FloatArray:
         """[L⁻ᵀ | K⁻¹ Y], (n, n + d_y): one product with k(x) gives variance and mean."""
-        L = cholesky(torch.from_numpy(self.kernel.gram(self.X)))
-        identity = torch.eye(len(L), dtype=torch.float64)
-        L_inverse: FloatArray = torch.linalg.solve_triangular(L, identity, upper=False).numpy()
+        L_inverse = whitener(self.kernel.gram(self.X))
         return np.ascontiguousarray(np.hstack([L_inverse.T, L_inverse.T @ (L_inverse @ self.Y)]))
 
 

@@ -10,13 +10,14 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from facert.data import FloatArray
 from facert.errors import InputError
 from facert.gaps import Gaussian
+from facert.learned import DAMAGED, Arrays, check_axes
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
 from facert.methods.device import find_device
 from facert.metrics import rms
@@ -25,55 +26,6 @@ from facert.settings import Settings
 from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
-
-DAMAGED = "The model file is damaged: train it again."
-
-
-@dataclass(frozen=True, eq=False)
-class Arrays:
-    """Arrays that were learned together; a field may be a group of such arrays itself.
-
-    `axes` spells the shape of each array, a letter an axis. A letter stands for one size in all of
-    them ("x" for d_x, "y" for d_y), a digit for itself: ``{"weights": "xy", "offset": "y"}``.
-    `parts` tells the type of each field that is a group.
-
-    Raises
-    ------
-    InputError
-        When the arrays do not fit together.
-    """
-
-    axes: ClassVar[Mapping[str, str]]
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {}
-
-    def __post_init__(self) -> None:
-        check_axes(self.arrays, self.all_axes())
-
-    @property
-    def arrays(self) -> dict[str, FloatArray]:
-        """Every array by its name, those of a part as ``part.name``."""
-        own = {name: getattr(self, name) for name in self.axes}
-        return own | {
-            f"{part}.{name}": array
-            for part in self.parts
-            for name, array in getattr(self, part).arrays.items()
-        }
-
-    @classmethod
-    def all_axes(cls) -> dict[str, str]:
-        """The shape of every array."""
-        return dict(cls.axes) | {
-            f"{part}.{name}": letters
-            for part, group in cls.parts.items()
-            for name, letters in group.all_axes().items()
-        }
-
-    @classmethod
-    def of(cls, arrays: Mapping[str, FloatArray], prefix: str = "") -> Self:
-        """Put together again what `arrays` told."""
-        own = {name: arrays[prefix + name] for name in cls.axes}
-        groups = {name: part.of(arrays, f"{prefix}{name}.") for name, part in cls.parts.items()}
-        return cls(**own, **groups)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +118,7 @@ class Regression(ABC):
 
     def _stay_on_cpu(self) -> None:
         device = self.settings.device
-        if find_device(device).type != "cpu":
+        if device != "cpu" and find_device(device).type != "cpu":
             log.warning("%s trains on the CPU: %s is not used", self.settings.method, device)
 
     def _linear_response(self, frames: FloatArray) -> FloatArray:
@@ -177,11 +129,13 @@ class Regression(ABC):
         products = (frames - self.gaps_.mean).T @ (poses - poses.mean(axis=0)) / len(frames)
         return np.linalg.solve(self.gaps_.covariance, products).astype(np.float64)
 
-    def predict(self, frames: FloatArray) -> Prediction:
-        """Map frames (T, d_x), each on its own; NaN: not observed."""
-        X, doubt = self.gaps_.fill_for(frames, self.response_)
+    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+        """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
+        X, variance = self.gaps_.fill_for(frames, self.response_)
+        if doubt is not None:
+            variance = variance + np.nan_to_num(doubt) @ self.response_**2
         Y, std = self.map_(X)
-        return Prediction(Y, None if std is None else np.sqrt(std**2 + doubt), X)
+        return Prediction(Y, None if std is None else np.sqrt(std**2 + variance), X)
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other; none remembers those before."""
@@ -241,27 +195,6 @@ class _MemorylessStream:
     def __init__(self, method: Regression) -> None:
         self.method = method
 
-    def step(self, frame: FloatArray) -> Prediction:
+    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
-        return self.method.predict(frame)
-
-
-def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dict[str, int]:
-    """The size that each letter stands for, found in the arrays; see `Map`.
-
-    Raises
-    ------
-    InputError
-        When an array is absent or empty, or its shape is not as spelt.
-    """
-    sizes: dict[str, int] = {}
-    for name, letters in axes.items():
-        array = arrays.get(name)
-        if array is None or array.ndim != len(letters) or not array.size:
-            found = "nothing" if array is None else f"shape {array.shape}"
-            raise InputError(name, f"an array of {len(letters)} dimensions", found, DAMAGED)
-        for letter, size in zip(letters, array.shape, strict=True):
-            expected = int(letter) if letter.isdigit() else sizes.setdefault(letter, size)
-            if size != expected:
-                raise InputError(name, f"{expected} for {letter}", f"shape {array.shape}", DAMAGED)
-    return sizes
+        return self.method.predict(frame, doubt)

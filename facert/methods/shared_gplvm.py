@@ -1,4 +1,10 @@
-"""The shared GPLVM as a retargeting method: semi-supervised (the paper's) and supervised."""
+"""The shared GPLVM as a retargeting method: semi-supervised (the paper's) and supervised.
+
+Small sets are trained exactly, as in the paper. Of large ones a core is, and the others are then
+joined to it (`facert.gplvm.staging`) in a model with inducing latents, in which they weigh no more
+than a hundred rows of each view (`facert.gplvm.sparse_module`): as every row counts alike in the
+exact model, hundreds without a partner overrule the labels, and the error rises.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +12,29 @@ import hashlib
 import logging
 import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from facert.data import FloatArray
 from facert.errors import InputError
-from facert.gp.kernel import Kernel
-from facert.gp.posterior import Posterior
+from facert.gp.posterior import Predictor
+from facert.gp.sparse import ApproximationName
 from facert.gplvm.alignment import align, principal_components
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
 from facert.gplvm.noise import with_noise
 from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
+from facert.gplvm.sparse_module import SparseSharedGPLVM
+from facert.gplvm.staging import Core, placed
 from facert.gplvm.target_mapping import map_to_target
 from facert.gplvm.training import train
+from facert.learned import DAMAGED
 from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
 from facert.methods.device import find_device
-from facert.optim.base import Optimiser
+from facert.methods.views import view_arrays, view_from
+from facert.optim.base import Result
 from facert.optim.lbfgs import LBFGS
 from facert.optim.monitor import Monitor
 from facert.optim.scg import SCG
@@ -36,17 +46,20 @@ log = logging.getLogger(__name__)
 OPTIMISERS: dict[OptimiserName, type[LBFGS] | type[SCG]] = {"lbfgs": LBFGS, "scg": SCG}
 
 
+ChosenLikelihood = Literal["exact", ApproximationName]
+
+
 class SemiSupervisedSGPLVM:
     """Bouaziz and Pauly (2014): labelled frames, the rest of the take, and old animation.
 
     Parameters
     ----------
     settings : Settings
-        Latent dimension, neighbours, noise, optimiser, device. `fit` fills in the noise of the
-        source where it is left open.
+        Latent dimension, neighbours, noise, likelihood, optimiser, device. `fit` fills in the noise
+        of the source where it is left open.
     """
 
-    most_unlabelled: ClassVar[int | None] = 100  # more have not been seen to help
+    most_unlabelled: ClassVar[int | None] = 100  # more do no harm, help little and take time
     stepwise: ClassVar[bool] = True
 
     def __init__(self, settings: Settings) -> None:
@@ -55,7 +68,7 @@ class SemiSupervisedSGPLVM:
     @property
     def dimensions(self) -> tuple[int, int]:
         """d_x and d_y of what it was trained on."""
-        return self.source_.X.shape[1], self.target_.X.shape[1]
+        return self.source_.columns, self.target_.columns
 
     def fit(
         self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
@@ -72,42 +85,31 @@ class SemiSupervisedSGPLVM:
         X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
         count = len(labelled.X)
         self.settings = with_noise(self._given, X)
-        with threads_for(len(X) + len(Y) - count):
-            module = self._initial_module(X, Y, count)
-            result = train(
-                module.to(find_device(self.settings.device)),
-                self._optimiser(),
-                tolerance=self.settings.tolerance,
-                max_iterations=self.settings.max_iterations,
-                checkpoint_every=self.settings.checkpoint_every,
-                fingerprint=_fingerprint(X, Y, self.settings),
-                monitor=monitor or Monitor(),
-            )
-            self._set_views(
-                Posterior(module.latents_x, X, module.kernel_x),
-                Posterior(module.latents_y, Y, module.kernel_y),
-            )
-        return Report(result, self._figures(labelled))
+        device = find_device(self.settings.device)
+        likelihood = self._likelihood(X, Y, count)
+        sparse = likelihood != "exact"
+        with threads_for(self.settings.inducing if sparse else len(X) + len(Y) - count):
+            module = self._module(X, Y, count, likelihood).to(device)
+            fingerprint = _fingerprint(X, Y, self.settings)
+            result = self._train(module, fingerprint, monitor or Monitor())
+            self._set_views(module.source_posterior(X), module.target_posterior(Y))
+        return Report(result, self._figures(labelled, unlabelled))
 
-    def predict(self, frames: FloatArray) -> Prediction:
-        """Map frames (T, d_x), each on its own; NaN: not observed."""
+    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+        """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
         with threads_for(len(self.source_.Z)):
-            return self._to_target(self.mapping_.solve(self._observed(frames)))
+            return self._to_target(self.mapping_.solve(self._observed(frames, doubt)))
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other, with the temporal term of Eq. (14)."""
         return _SharedStream(self)
 
     def save(self) -> dict[str, FloatArray]:
-        """Both trained views: latent coordinates, observations, kernel parameters."""
+        """Both trained views: what mapping needs of them, see `facert.methods.views`."""
         arrays: dict[str, FloatArray] = {}
-        for view, posterior in (("source", self.source_), ("target", self.target_)):
-            kernel = posterior.kernel
-            arrays[f"{view}.latents"] = posterior.Z
-            arrays[f"{view}.observations"] = posterior.X
-            arrays[f"{view}.kernel"] = np.array(
-                [kernel.variance, kernel.inverse_width, kernel.noise]
-            )
+        for view, predictor in (("source", self.source_), ("target", self.target_)):
+            for name, array in view_arrays(predictor).items():
+                arrays[f"{view}.{name}"] = array
         return arrays
 
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -118,23 +120,23 @@ class SemiSupervisedSGPLVM:
         InputError
             When an array is absent or the shapes do not fit together.
         """
-        if self.settings.sigma_c is None:
-            raise InputError("settings", "a number as sigma_c", "none", _DAMAGED)
-        views = [_view(arrays, name) for name in ("source", "target")]
+        if self.settings.sigma_c is None or self.settings.sigma_t is None:
+            raise InputError("settings", "numbers as sigma_c and sigma_t", "none", DAMAGED)
+        views = [view_from(arrays, name) for name in ("source", "target")]
         if views[0].Z.shape[1] != views[1].Z.shape[1]:
             dimensions = [view.Z.shape[1] for view in views]
             raise InputError(
-                "target.latents", f"{dimensions[0]} dimensions", f"{dimensions[1]}", _DAMAGED
+                "target.latents", f"{dimensions[0]} dimensions", f"{dimensions[1]}", DAMAGED
             )
         self._set_views(*views)
 
-    def _set_views(self, source: Posterior, target: Posterior) -> None:
+    def _set_views(self, source: Predictor, target: Predictor) -> None:
         self.source_, self.target_ = source, target
         self.mapping_ = SourceMapping(source)
 
-    def _observed(self, frames: FloatArray) -> Observation:
+    def _observed(self, frames: FloatArray, doubt: FloatArray | None) -> Observation:
         assert self.settings.sigma_c is not None  # filled in by fit, checked by load
-        return Observation.of(frames, self.settings.sigma_c)
+        return Observation.of(frames, self.settings.sigma_c, doubt)
 
     def _to_target(self, mapped: Mapped) -> Prediction:
         if not mapped.converged.all():
@@ -142,30 +144,79 @@ class SemiSupervisedSGPLVM:
         mean, std = map_to_target(self.target_, mapped)
         return Prediction(mean, std, mapped.x)
 
-    def _initial_module(self, X: FloatArray, Y: FloatArray, labelled: int) -> SharedGPLVM:
+    def _module(
+        self, X: FloatArray, Y: FloatArray, labelled: int, likelihood: ChosenLikelihood
+    ) -> SharedGPLVM:
+        """What is to be trained, at its initial parameters: a large model begins at a small one."""
+        if likelihood == "exact":
+            return self._exact_module(X, Y, labelled)
+        core = Core.of(X, Y, labelled)
+        small = self._exact_module(X[core.rows_x], Y[core.rows_y], core.labelled)
+        begun = self._train(small.to(find_device(self.settings.device)), "", Monitor())
+        if begun.status == "interrupted":  # there is no model yet that could be kept
+            raise KeyboardInterrupt
+        large = SparseSharedGPLVM(
+            X,
+            Y,
+            labelled,
+            self._constraints(X, Y, labelled),
+            placed(small, X, Y, labelled, core),
+            small.noise_floor_x,
+            small.noise_floor_y,
+            inducing=self.settings.inducing,
+            approximation=likelihood,
+        )
+        large.begin_at(small)
+        return large
+
+    def _likelihood(self, X: FloatArray, Y: FloatArray, labelled: int) -> ChosenLikelihood:
+        """The setting; where that is left open, exact while there is no more than a core."""
+        if self.settings.likelihood != "auto":
+            return self.settings.likelihood
+        return "exact" if Core.of(X, Y, labelled).is_all_of(X, Y) else "vfe"
+
+    def _exact_module(self, X: FloatArray, Y: FloatArray, labelled: int) -> SharedGPLVM:
         points = len(X) + len(Y) - labelled
         latent_dim = min(self.settings.latent_dim, points - 1)
         if latent_dim < self.settings.latent_dim:
             log.warning("%d points carry only %d latent dimensions", points, latent_dim)
-        M, Z = self._prior_and_start(X, Y, labelled, latent_dim)
+        M = self._constraints(X, Y, labelled)
+        Z = self._start(X, Y, M, latent_dim)
         floor_x, floor_y = self.settings.source_noise_floor, self.settings.target_noise_floor
         assert floor_x is not None  # filled in before
         return SharedGPLVM(X, Y, labelled, M, Z, floor_x, floor_y)
 
-    def _prior_and_start(
-        self, X: FloatArray, Y: FloatArray, labelled: int, latent_dim: int
-    ) -> tuple[csr_array | None, FloatArray]:
-        """Constraints of the latent prior, Eq. (6), and latents that satisfy them best."""
-        M = constraint_matrix(X, Y, labelled, self.settings.neighbours)
-        return M, align(M, latent_dim)
+    def _constraints(self, X: FloatArray, Y: FloatArray, labelled: int) -> csr_array | None:
+        """Of the latent prior, Eq. (6)."""
+        return constraint_matrix(X, Y, labelled, self.settings.neighbours)
 
-    def _optimiser(self) -> Optimiser:
-        return OPTIMISERS[self.settings.optimizer]()
+    def _start(
+        self,
+        X: FloatArray,  # noqa: ARG002  the constraints know them
+        Y: FloatArray,  # noqa: ARG002
+        M: csr_array | None,
+        latent_dim: int,
+    ) -> FloatArray:
+        """Latents that satisfy the constraints best."""
+        assert M is not None
+        return align(M, latent_dim)
 
-    def _figures(self, labelled: Labelled) -> dict[str, float]:
+    def _train(self, module: SharedGPLVM, fingerprint: str, monitor: Monitor) -> Result:
+        return train(
+            module,
+            OPTIMISERS[self.settings.optimizer](),
+            tolerance=self.settings.tolerance,
+            max_iterations=self.settings.max_iterations,
+            checkpoint_every=self.settings.checkpoint_every,
+            fingerprint=fingerprint,
+            monitor=monitor,
+            magnitude=float(module.entries),
+        )
+
+    def _figures(self, labelled: Labelled, unlabelled: Unlabelled) -> dict[str, float]:
         figures: dict[str, float] = {
-            "unlabelled frames": len(self.source_.X) - len(labelled.X),
-            "unlabelled poses": len(self.target_.X) - len(labelled.X),
+            "unlabelled frames": len(unlabelled.X),
+            "unlabelled poses": len(unlabelled.Y),
             "sigma_c": self.settings.sigma_c or math.nan,
         }
         for view, posterior in (("source", self.source_), ("target", self.target_)):
@@ -186,14 +237,22 @@ class SupervisedSGPLVM(SemiSupervisedSGPLVM):
         nothing = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
         return super().fit(labelled, nothing, monitor)
 
-    def _prior_and_start(
+    def _constraints(
+        self,
+        X: FloatArray,  # noqa: ARG002
+        Y: FloatArray,  # noqa: ARG002
+        labelled: int,  # noqa: ARG002
+    ) -> None:
+        return None
+
+    def _start(
         self,
         X: FloatArray,
         Y: FloatArray,
-        labelled: int,  # noqa: ARG002  all rows are
+        M: csr_array | None,  # noqa: ARG002
         latent_dim: int,
-    ) -> tuple[csr_array | None, FloatArray]:
-        return None, principal_components(np.hstack([X, Y]), latent_dim)
+    ) -> FloatArray:
+        return principal_components(np.hstack([X, Y]), latent_dim)
 
 
 class _SharedStream:
@@ -201,14 +260,17 @@ class _SharedStream:
         self.method = method
         self.previous: Mapped | None = None
 
-    def step(self, frame: FloatArray) -> Prediction:
+    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
-        observed = self.method._observed(frame)
-        starts = []
-        if self.previous is not None:
-            observed = observed.following(self.previous.x, self.method.settings.sigma_t)
-            starts.append(self.previous.z)
-        self.previous = self.method.mapping_.solve(observed, *starts)
+        observed = self.method._observed(frame, doubt)
+        mapping = self.method.mapping_
+        if self.previous is None:
+            self.previous = mapping.solve(observed)
+        else:
+            sigma_t = self.method.settings.sigma_t
+            assert sigma_t is not None  # filled in by fit, checked by load
+            observed = observed.following(self.previous.x, sigma_t)
+            self.previous = mapping.follow(observed, self.previous.z)
         return self.method._to_target(self.previous)
 
 
@@ -224,29 +286,11 @@ def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
         round(settings.source_noise_floor or 0.0, 6),
         settings.target_noise_floor,
         settings.optimizer,
+        settings.likelihood,
+        settings.inducing,
         settings.checkpoint_every,
         X.shape,
         Y.shape,
     )
     digest.update(repr(shaping).encode())
     return digest.hexdigest()
-
-
-def _view(arrays: Mapping[str, FloatArray], name: str) -> Posterior:
-    def array(part: str, ndim: int) -> FloatArray:
-        key = f"{name}.{part}"
-        value = arrays.get(key)
-        if value is None or value.ndim != ndim or not value.size:
-            found = "nothing" if value is None else f"shape {value.shape}"
-            raise InputError(key, f"an array of {ndim} dimensions", found, _DAMAGED)
-        return value
-
-    Z, X, theta = array("latents", 2), array("observations", 2), array("kernel", 1)
-    if len(Z) != len(X):
-        raise InputError(f"{name}.latents", f"{len(X)} rows", f"{len(Z)}", _DAMAGED)
-    if theta.shape != (3,) or not (theta > 0).all():
-        raise InputError(f"{name}.kernel", "three positive numbers", f"{theta}", _DAMAGED)
-    return Posterior(Z, X, Kernel(*theta.tolist()))
-
-
-_DAMAGED = "The model file is damaged: train it again."

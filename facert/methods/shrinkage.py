@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from facert.data import FloatArray
-from facert.methods.regression import Arrays
+from facert.learned import Arrays
 
 # Added to the covariance of all poses, relative to its mean variance: few poses leave it singular.
 RIDGE = 1e-6

@@ -16,10 +16,11 @@ import numpy as np
 
 from facert.data import FloatArray
 from facert.gp.regression import maximise_likelihood
+from facert.learned import Arrays
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.features import whitening
 from facert.methods.gpr import ProcessMap
-from facert.methods.regression import Arrays, Map, Regression
+from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
 
 POWER = 0.5  # half-whitening

@@ -1,4 +1,4 @@
-"""L-BFGS-B through SciPy, run in stages that can be resumed."""
+"""L-BFGS through SciPy, run in stages that can be resumed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from facert.optim.base import Objective, State, Watcher, initial_state
 
 
 class LBFGS:
-    """Limited-memory BFGS with bounds (Byrd, Lu, Nocedal and Zhu 1995).
+    """Limited-memory BFGS (Byrd, Lu, Nocedal and Zhu 1995).
+
+    There are no bounds: they would double what SciPy itself takes for an iteration, and where an
+    exponential overflows the objective is infinite, which is survived.
 
     SciPy does not hand out its correction pairs, so that each `advance` begins with an empty
     memory. A run that was stopped between two stages and resumed therefore retraces an
@@ -22,14 +25,10 @@ class LBFGS:
     ----------
     corrections : int
         Pairs kept; 20 suits latent coordinates.
-    bound : float
-        Box on every variable. Far outside of any sensible log-parameter or latent coordinate; it
-        keeps the line search from overflowing the exponentials.
     """
 
-    def __init__(self, corrections: int = 20, bound: float = 30.0) -> None:
+    def __init__(self, corrections: int = 20) -> None:
         self.corrections = corrections
-        self.bound = bound
 
     def start(self, objective: Objective, x: FloatArray) -> State:
         """The state before the first iteration."""
@@ -43,7 +42,6 @@ class LBFGS:
             state.x,
             jac=True,
             method="L-BFGS-B",
-            bounds=[(-self.bound, self.bound)] * len(state.x),
             callback=stage.note,
             options={
                 "maxiter": iterations,

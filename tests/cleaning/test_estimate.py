@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from facert.cleaning.estimate import estimate
+from facert.cleaning.estimate import (
+    LONGEST,
+    estimate,
+    estimate_if_it_moves,
+    grid,
+    largest_step,
+)
 from facert.cleaning.factors import Factors
 from facert.cleaning.interpolation import interpolated
 from facert.cleaning.matern import decay, transition
@@ -11,6 +17,10 @@ from facert.cleaning.smoothing import smooth_factors, smooth_series
 from facert.errors import InputError
 from facert.gaps import fill_gaps
 from facert.io.formats import read_take_file
+
+
+def estimated(X, sigma=None):
+    return estimate(X, np.arange(len(X)) / 30.0, sigma)
 
 
 def rms(values):
@@ -130,7 +140,7 @@ def test_gaps_are_filled_better_than_by_lines_or_by_frames_alone(frames, hide, s
     noisy = frames + sigma * np.random.default_rng(0).normal(size=frames.shape)
     X = hide(noisy)
     hidden = np.isnan(X)
-    error = rms((estimate(X).frames - frames)[hidden])
+    error = rms((estimated(X).frames - frames)[hidden])
     assert error < 0.7 * rms((interpolated(X, np.arange(400.0)) - frames)[hidden])
     if sigma:  # these few factors without noise are exact for any linear method
         assert error < 0.9 * rms((fill_gaps(X) - frames)[hidden])
@@ -138,18 +148,18 @@ def test_gaps_are_filled_better_than_by_lines_or_by_frames_alone(frames, hide, s
 
 def test_noise_is_more_than_halved(frames):
     noisy = frames + 0.1 * np.random.default_rng(0).normal(size=frames.shape)
-    assert rms(estimate(noisy).frames - frames) < 0.5 * 0.1
+    assert rms(estimated(noisy).frames - frames) < 0.5 * 0.1
 
 
 def test_a_clean_take_is_left_as_it_is(frames):
-    found = estimate(frames)
+    found = estimated(frames)
     assert rms(found.frames - frames) < 2.0 * found.sigma
 
 
 def test_uncertainty_tells_the_size_of_errors(frames):
     noisy = frames + 0.05 * np.random.default_rng(0).normal(size=frames.shape)
     X = with_bursts(with_gaps(noisy))
-    found = estimate(X)
+    found = estimated(X)
     off, hidden = np.abs(found.frames - frames), np.isnan(X)
     for entries in (hidden, ~hidden):
         assert (off < 2.0 * found.std)[entries].mean() > 0.8
@@ -159,35 +169,85 @@ def test_uncertainty_tells_the_size_of_errors(frames):
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_units_and_origin_do_not_matter(frames, scale):
     X = with_gaps(frames[:200])
-    one, other = estimate(X), estimate(scale * X + 7.0)
+    one, other = estimated(X), estimated(scale * X + 7.0)
     np.testing.assert_allclose(other.frames, scale * one.frames + 7.0, atol=1e-5 * scale)
     np.testing.assert_allclose(other.std, scale * one.std, rtol=1e-3)
 
 
 def test_a_given_noise_is_believed(frames):
     noisy = (frames + 0.05 * np.random.default_rng(0).normal(size=frames.shape))[:200]
-    assert rms(estimate(noisy, 0.0).frames - noisy) < rms(estimate(noisy, 0.2).frames - noisy)
-    assert estimate(noisy, 0.2).sigma == 0.2
+    assert rms(estimated(noisy, 0.0).frames - noisy) < rms(estimated(noisy, 0.2).frames - noisy)
+    assert estimated(noisy, 0.2).sigma == 0.2
 
 
 def test_columns_never_seen_stay_open(frames):
     X = frames.copy()
     X[:, 3:6] = np.nan
-    found = estimate(X)
+    found = estimated(X)
     np.testing.assert_array_equal(np.isnan(found.frames), np.isnan(X))
     np.testing.assert_array_equal(np.isnan(found.std), np.isnan(X))
 
 
 @pytest.mark.parametrize("count", [2, 3, 10])
 def test_few_frames_are_enough_not_to_fail(frames, count):
-    found = estimate(frames[:count])
+    found = estimated(frames[:count])
     assert np.isfinite(found.frames).all()
     assert np.isfinite(found.std).all()
 
 
+def test_a_gap_in_time_is_a_gap_in_the_frames(frames):
+    time = np.arange(len(frames)) / 30.0
+    kept = np.r_[0:100, 103:400]
+    hidden = frames.copy()
+    hidden[100:103] = np.nan
+    through, across = estimate(hidden, time), estimate(frames[kept], time[kept])
+    np.testing.assert_allclose(across.frames, through.frames[kept], atol=1e-10)
+    assert grid(time[kept])[0][-1] == 399
+
+
+def test_a_face_seen_for_a_moment_of_a_long_take_is_smoothed_there(frames):
+    X = np.full((5000, frames.shape[1]), np.nan)
+    X[60:200] = frames[:140]
+    found = estimated(X)
+    assert np.isfinite(found.frames).all()
+    assert np.isfinite(found.std).all()
+    assert rms((found.frames - X)[60:200]) < 0.05 * frames.std()
+
+
+def test_packets_that_come_in_bursts_have_the_rate_that_they_have_on_average():
+    time = np.repeat(np.arange(60) * 0.05, 3) + np.tile([0.0, 1e-4, 2e-4], 60)
+    places, step = grid(time)
+    assert 0.01 < step < 0.02
+    assert places[-1] < 2 * len(time)
+
+
+def test_gaps_of_hours_are_cut_short():
+    places, step = grid(np.array([0.0, 0.1, 0.2, 7200.0]))
+    assert places.tolist() == [0, 1, 2, 2 + LONGEST]
+    assert step == pytest.approx(0.1)
+
+
+def test_single_poses_and_still_faces_are_left_alone(frames, caplog):
+    rng, time = np.random.default_rng(0), np.arange(400.0)
+    assert estimate_if_it_moves(frames[:5], time[:5]) is None
+    assert estimate_if_it_moves(np.ones((20, 6)), time[:20]) is None
+    assert not caplog.messages
+    assert estimate_if_it_moves(rng.permutation(frames), time) is None
+    assert "do not follow each other" in caplog.text
+    assert estimate_if_it_moves(frames, time) is not None
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.05])
+def test_the_step_from_frame_to_frame_is_found_through_noise(frames, sigma):
+    noisy = frames + sigma * np.random.default_rng(0).normal(size=frames.shape)
+    true = np.sqrt((np.diff(frames, axis=0) ** 2).mean(axis=0).max())
+    assert largest_step(with_gaps(noisy), sigma) == pytest.approx(true, rel=0.2)
+    assert estimated(noisy).sigma_t == pytest.approx(true, rel=0.2)
+
+
 def test_a_take_in_which_nothing_moves_is_refused():
     with pytest.raises(InputError, match="change"):
-        estimate(np.ones((10, 6)))
+        estimated(np.ones((10, 6)))
 
 
 @pytest.mark.real
@@ -200,6 +260,6 @@ def test_real_markers_come_back_better_than_by_lines_or_by_frames_alone(real_dat
     noisy = truth + 0.05 * truth.std() * np.random.default_rng(0).normal(size=truth.shape)
     X = with_bursts(noisy)
     hidden = np.isnan(X)
-    error = rms((estimate(X).frames - truth)[hidden])
+    error = rms((estimated(X).frames - truth)[hidden])
     assert error < 0.8 * rms((interpolated(X, np.arange(600.0)) - truth)[hidden])
     assert error < 0.8 * rms((fill_gaps(X) - truth)[hidden])

@@ -65,6 +65,19 @@ def test_every_frame_gets_the_pose_of_the_reference_frame(face, head, as_take):
     np.testing.assert_allclose(found.head.matrices[7], np.eye(4), atol=1e-12)
 
 
+@pytest.mark.parametrize("stable", [STABLE, "automatic"])
+def test_two_takes_get_the_same_head_pose_when_one_is_like_the_other(face, head, as_take, stable):
+    one = stabilise(as_take(head.apply(face)[:200]), stable).take
+    other = stabilise(as_take(head.apply(face)[200:]), stable, reference=one)
+    together = np.concatenate([one.source.values, other.take.source.values])
+    assert off(together, face) < 0.02
+    np.testing.assert_allclose(
+        other.head.apply(other.take.source.values), head.apply(face)[200:], atol=1e-9
+    )
+    if stable == "automatic":
+        assert set(other.names) == set(stabilise(one).names)
+
+
 def test_gaps_and_gross_errors_of_stable_markers_hardly_matter(face, head, as_take):
     rng = np.random.default_rng(3)
     moved = head.apply(face)

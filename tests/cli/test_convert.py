@@ -108,7 +108,91 @@ def test_bad_input_gets_one_line_and_no_output(facert, tmp_path, make, name):
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
-def test_the_unit_that_is_asked_for_replaces_the_one_of_the_file(facert, recording, tmp_path):
-    facert("convert", recording, tmp_path / "one.h5", "--units", "cm")
-    facert("convert", tmp_path / "one.h5", tmp_path / "two.h5", "--units", "mm")
-    assert read_take_file(tmp_path / "two.h5").units == "mm"
+MARKERS = "time,a.x,a.y,a.z\n0,1,2,3\n0.02,1,2,4\n0.04,1,2,5\n"
+
+
+@pytest.fixture
+def capture(tmp_path):
+    path = tmp_path / "capture.csv"
+    path.write_text(MARKERS)
+    return path
+
+
+def test_rate_unit_and_axis_are_converted(facert, capture, tmp_path):
+    space = ("--in-units", "cm", "--units", "m", "--in-up-axis", "z", "--up-axis", "y")
+    output = tmp_path / "take.h5"
+    assert facert("convert", capture, output, "--fps", "100", *space).code == 0
+    take = read_take_file(output)
+    np.testing.assert_allclose(take.time, np.arange(5) / 100)
+    np.testing.assert_allclose(take.source.values[:, 0, 1], [0.03, 0.035, 0.04, 0.045, 0.05])
+    np.testing.assert_allclose(take.source.values[:, 0, ::2], [[0.01, -0.02]] * 5)
+    assert (take.fps, take.units, take.up_axis) == (100.0, "m", "y")
+    again = facert("convert", output, tmp_path / "mm.h5", "--units", "mm", "--up-axis", "z")
+    assert again.code == 0
+    np.testing.assert_allclose(read_take_file(tmp_path / "mm.h5").source.values[0], [[10, 20, 30]])
+
+
+def test_what_in_does_not_say_is_taken_to_be_as_asked_and_told(facert, capture, tmp_path):
+    done = facert("convert", capture, tmp_path / "take.h5", "--units", "cm", "--up-axis", "y")
+    assert "does not say its unit: it is taken to be cm" in done.err
+    assert "does not say its up axis: it is taken to be y" in done.err
+    take = read_take_file(tmp_path / "take.h5")
+    np.testing.assert_array_equal(take.source.values[0], [[1, 2, 3]])
+    assert (take.units, take.up_axis) == ("cm", "y")
+
+
+def test_frame_numbers_have_the_rate_of_in_and_out_has_its_own(facert, tmp_path):
+    (tmp_path / "a.csv").write_text("frame,a\n0,1\n1,2\n2,3\n")
+    facert("convert", tmp_path / "a.csv", tmp_path / "a.json", "--in-fps", "10", "--fps", "20")
+    take = read_take_file(tmp_path / "a.json")
+    np.testing.assert_allclose(take.time, np.arange(5) / 20)
+    np.testing.assert_allclose(take.source.values[:, 0], [1, 1.5, 2, 2.5, 3])
+
+
+def test_a_map_renames_strictly(facert, recording, tmp_path):
+    names = tmp_path / "names.toml"
+    names.write_text('jaw-open = "Kiefer"\n')
+    assert facert("convert", recording, tmp_path / "a.h5", "--map", names).code == 0
+    assert read_take_file(tmp_path / "a.h5").source.names == ("Kiefer", "mouthSmileLeft")
+    names.write_text('jawOpne = "Kiefer"\n')
+    refused = facert("convert", recording, tmp_path / "b.h5", "--map", names)
+    assert refused.code == 3
+    assert "Did you mean 'jawOpen'?" in refused.err
+    assert not (tmp_path / "b.h5").exists()
+
+
+def test_poses_of_another_file_become_labels(facert, capture, tmp_path):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("frame,jaw,smile\n2,0.5,0.25\n0,0,0\n")
+    done = facert("convert", capture, tmp_path / "take.h5", "--poses", poses)
+    assert "3 frames of 1 markers and 2 poses" in done.out
+    take = read_take_file(tmp_path / "take.h5")
+    assert take.labels.tolist() == [0, 2]
+    assert take.params[2].tolist() == [0.5, 0.25]
+    poses.write_text("frame,jaw,smile\n3,0.5,0.25\n")
+    refused = facert("convert", capture, tmp_path / "b.h5", "--poses", poses)
+    assert refused.code == 3
+    assert f"{poses}: column frame: expected 0 to 2, found 3" in refused.err
+
+
+def test_the_start_timecode_is_set_or_refused(facert, capture, tmp_path):
+    facert("convert", capture, tmp_path / "a.h5", "--start-timecode", "01:02:03:04")
+    assert read_take_file(tmp_path / "a.h5").start_timecode == "01:02:03:04"
+    refused = facert("convert", capture, tmp_path / "b.h5", "--start-timecode", "noon")
+    assert (refused.code, "HH:MM:SS:FF" in refused.err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--fps", "30"), ("--start-timecode", "01:00:00:00")]
+)
+def test_a_rig_has_no_frames(facert, tmp_path, option, value):
+    np.savez(tmp_path / "rig.npz", neutral=np.eye(3), faces=[[0, 1, 2]],
+             deltas=np.ones((1, 3, 3)), names=["a"])  # fmt: skip
+    refused = facert("convert", tmp_path / "rig.npz", tmp_path / "rig.h5", option, value)
+    assert refused.code == 3
+    assert f"{option}: expected a take" in refused.err
+    turned = ("--in-up-axis", "z", "--up-axis", "y", "--in-units", "m", "--units", "cm")
+    assert facert("convert", tmp_path / "rig.npz", tmp_path / "rig.h5", *turned).code == 0
+    np.testing.assert_allclose(
+        read_rig_file(tmp_path / "rig.h5").neutral, [[100, 0, 0], [0, 0, -100], [0, 100, 0]]
+    )

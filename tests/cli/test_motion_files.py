@@ -11,7 +11,7 @@ import trimesh
 
 from facert.data import Controls, MeshSequence, Rig, Source, Take
 from facert.io.mesh_sequence import write_mesh_sequence
-from facert.io.rig import write_rig
+from facert.io.rig import read_rig, write_rig
 from facert.io.take import write_take
 
 VERTICES = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -50,6 +50,46 @@ def test_a_take_becomes_a_glb_of_the_shapes_that_it_moves(facert, folder: Path) 
     outcome = facert("convert", folder / "take.h5", folder / "a.glb", "--rig", folder / "rig.h5")
     assert "24 frames of 1 morph targets" in outcome.out
     assert b'"targetNames":["up"]' in (folder / "a.glb").read_bytes()
+
+
+def test_a_take_becomes_usd(facert, folder: Path) -> None:
+    pytest.importorskip("pxr", reason="needs usd-core")
+    arguments = ("convert", folder / "take.h5", folder / "a.usda", "--rig", folder / "rig.h5")
+    assert "24 frames of 1 morph targets" in facert(*arguments).out
+    assert 'def BlendShape "up"' in (folder / "a.usda").read_text()
+    assert facert("convert", folder / "face.h5", folder / "face.usdc").code == 0
+
+
+def test_a_rig_becomes_a_glb_and_comes_back(facert, folder: Path) -> None:
+    assert facert("convert", folder / "rig.h5", folder / "rig.glb").code == 0
+    assert facert("convert", folder / "rig.glb", folder / "back.h5", "--units", "cm").code == 0
+    back = read_rig(folder / "back.h5")
+    np.testing.assert_allclose(back.neutral, RIG.neutral, atol=1e-6)
+    np.testing.assert_allclose(back.shapes, RIG.shapes, atol=1e-6)
+    assert (back.names, back.units) == (RIG.names, "cm")
+
+
+def test_an_animated_glb_is_a_rig_or_a_take(facert, folder: Path) -> None:
+    glb = folder / "a.glb"
+    facert("convert", folder / "take.h5", glb, "--rig", folder / "rig.h5")
+    assert "a rig" in facert("convert", glb, folder / "b.h5").out
+    assert "a take" in facert("convert", glb, folder / "c.h5", "--kind", "take").out
+    assert "a take" in facert("convert", glb, folder / "c.json").out
+    assert "24 frames" in facert("convert", glb, folder / "d.glb", "--rig", glb).out
+
+
+def test_tracked_weights_move_a_rig_of_their_names(facert, folder: Path) -> None:
+    (folder / "face.csv").write_text("time,Up,headYaw\n0,0.5,9\n0.1,,9\n0.2,1,9\n")
+    arguments = ("convert", folder / "face.csv", folder / "e.glb", "--rig", folder / "rig.h5")
+    done = facert(*arguments)
+    assert "2 frames of 1 morph targets" in done.out
+    assert "1 weights move nothing: headYaw" in done.err
+
+
+def test_options_for_takes_are_refused_for_a_mesh_sequence(facert, folder: Path) -> None:
+    refused = facert("convert", folder / "face.h5", folder / "a.glb", "--fps", "10")
+    assert (refused.code, "a mesh sequence" in refused.err) == (3, True)
+    assert facert("convert", folder / "face.h5", folder / "b.h5").code == 3
 
 
 def test_a_take_without_a_rig_is_no_glb(facert, folder: Path) -> None:

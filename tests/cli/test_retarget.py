@@ -59,7 +59,7 @@ def test_poses_that_it_was_trained_on_tell_no_error(facert, files, make_take):
     api.write_take(arkit(make_take()), take, overwrite=True)
     done = facert("retarget", take, out, "--model", model)
     assert "RMS" not in done.out
-    assert "those it was trained on" in done.err
+    assert "surely not trained on" in done.err
     assert "other controls" not in done.err
 
 
@@ -196,3 +196,30 @@ def test_an_ending_without_a_format_is_refused(facert, files, tmp_path):
     failed = facert("retarget", take, tmp_path / "out.docx", "--model", model)
     assert failed.code == 3
     assert not (tmp_path / "out.docx").exists()
+
+
+def test_controls_neutral_and_switches_are_passed_on(facert, files, tmp_path):
+    take, out, model = files
+    (tmp_path / "controls.toml").write_text('[jawOpen]\ngain = 0.0\n["mouth*"]\nsmoothing = 0.0\n')
+    options = ("--controls", tmp_path / "controls.toml", "--neutral", "0..5", "--sigma", "0.1")
+    for mode in ("offline", "online"):
+        done = facert("retarget", take, out, "-m", model, *options, "--mode", mode, "--overwrite")
+        assert done.code == 0, done.err
+        assert (api.read_take(out).params[:, 0] == 0.0).all()
+    plain = facert("retarget", take, out, "-m", model, "--no-detect", "--no-smooth", "--overwrite")
+    assert plain.code == 0
+    assert "capture noise" not in plain.err
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [("[jawOpne]\ngain = 1.0\n", "jawOpen"), ("gain = 1.0\n", "table"), ("[", "TOML")],
+)
+def test_a_bad_file_of_controls_is_told(facert, files, tmp_path, text, word):
+    take, out, model = files
+    (tmp_path / "controls.toml").write_text(text)
+    done = facert("retarget", take, out, "-m", model, "--controls", tmp_path / "controls.toml")
+    assert done.code == 3
+    assert word in done.err
+    assert "controls.toml" in done.err
+    assert not out.exists()

@@ -100,3 +100,16 @@ def test_a_table_holds_the_markers_alone(facert, files, tmp_path):
     assert done.code == 0, done.err
     assert "/source/head" in done.err
     assert api.read_take(tmp_path / "out.csv").source.values.shape == (90, 8, 3)
+
+
+def test_a_second_take_gets_the_head_pose_of_the_first(facert, files, tmp_path):
+    take, _, moved, output = files
+    write(tmp_path / "second.h5", moved[45:])
+    assert facert("stabilise", take, output, "--stable", "m0,m1,m2,m3,m4").code == 0
+    second, stable = tmp_path / "steady.h5", ("--stable", "m0,m1,m2,m3,m4")
+    done = facert("stabilise", tmp_path / "second.h5", second, *stable, "--like", output)
+    assert done.code == 0, done.err
+    first, other = (read_take(path).source.values for path in (output, second))
+    np.testing.assert_allclose(other, first[45:], atol=0.05)
+    both = facert("stabilise", take, second, "--like", output, "--reference", "0", "--overwrite")
+    assert both.code == 2

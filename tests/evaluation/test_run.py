@@ -20,6 +20,7 @@ from facert.evaluation.protocol import (
     true_poses,
 )
 from facert.evaluation.run import Grid, fingerprint, run
+from facert.handling import AS_IT_IS
 from facert.io.journal import Journal
 from facert.methods import REGISTRY
 from facert.metrics import rms
@@ -37,7 +38,7 @@ def test_a_cell_equals_a_direct_computation(make, quick):
     retargeter = facert.train(
         training_take(problem, chosen, 1), cell_settings(problem, cell, quick)
     )
-    result = retargeter.retarget(held_out_take(problem, chosen, 1))
+    result = retargeter.retarget(held_out_take(problem, chosen, 1), handling=AS_IT_IS)
     outcome = evaluate(problem, cell, quick)
     assert outcome.scores.rms == rms(result.params - true_poses(problem, chosen))
     assert outcome.fit_seconds > 0

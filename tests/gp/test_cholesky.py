@@ -2,7 +2,8 @@ import pytest
 import torch
 
 from facert.errors import NumericalError
-from facert.gp.cholesky import JITTER_LADDER, cholesky
+from facert.gp.cholesky import cholesky
+from facert.gp.jitter import JITTER_LADDER
 
 
 def definite(n=5):

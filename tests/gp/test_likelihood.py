@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 import torch
 from sklearn.gaussian_process import GaussianProcessRegressor
@@ -5,7 +6,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from torch.distributions import MultivariateNormal
 
 from facert.errors import NumericalError
-from facert.gp.likelihood import compact_factor, negative_log_likelihood
+from facert.gp.lapack import value_and_gradient
+from facert.gp.likelihood import by_torch, compact_factor, negative_log_likelihood
 
 COLUMNS = 6
 FLOOR = 0.02
@@ -60,6 +62,35 @@ def test_the_closed_form_gradient_is_that_of_autograd_through_the_cholesky(probl
         strict=True,
     ):
         torch.testing.assert_close(a, b, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("points", [1, 2, 10, 60])
+def test_lapack_and_torch_agree(points):
+    rng = np.random.default_rng(points)
+    Z, X = rng.normal(size=(points, 3)), rng.normal(size=(points, COLUMNS))
+    given = Z, np.log([1.3, 0.7, 0.05]), X
+    ours = value_and_gradient(*given, COLUMNS, FLOOR)
+    theirs = by_torch(*(torch.from_numpy(array) for array in given), COLUMNS, FLOOR)
+    assert ours[0] == pytest.approx(theirs[0].item(), rel=1e-12)
+    for a, b in zip(ours[1:], theirs[1:], strict=True):
+        np.testing.assert_allclose(a, b.numpy(), rtol=1e-9, atol=1e-9)
+
+
+def test_lapack_leaves_what_it_is_given_as_it_was():
+    rng = np.random.default_rng(0)
+    given = rng.normal(size=(9, 2)), np.zeros(3), rng.normal(size=(9, COLUMNS))
+    before = [array.copy() for array in given]
+    value_and_gradient(*given, COLUMNS, FLOOR)
+    for array, kept in zip(given, before, strict=True):
+        np.testing.assert_array_equal(array, kept)
+
+
+def test_two_rows_at_one_place_with_hardly_any_noise_climb_the_ladder(caplog):
+    Z = np.repeat(np.random.default_rng(0).normal(size=(20, 2)), 2, axis=0)
+    value, dZ, _ = value_and_gradient(Z, np.array([0.0, 0.0, -80.0]), Z, 2, 0.0)
+    assert "to the diagonal" in caplog.text
+    assert np.isfinite(value)
+    assert np.isfinite(dZ).all()
 
 
 def test_the_compact_factor_changes_neither_value_nor_gradient(problem):

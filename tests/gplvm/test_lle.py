@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import special_ortho_group
 from sklearn.manifold._locally_linear import barycenter_kneighbors_graph
 
-from facert.gplvm.lle import constraint_matrix, nearest_neighbours, reconstruction_weights
+from facert.gplvm.lle import CHUNK, constraint_matrix, nearest_neighbours, reconstruction_weights
 
 
 def cloud(n=30, d=5, seed=0):
@@ -33,8 +35,9 @@ def test_weights_do_not_change_when_the_data_are_rotated_scaled_and_moved(scale,
     )
 
 
-def test_weights_are_those_of_scikit_learn():
-    U = cloud()
+@pytest.mark.parametrize("n", [30, CHUNK + 100])
+def test_weights_are_those_of_scikit_learn(n):
+    U = cloud(n)
     theirs = barycenter_kneighbors_graph(U, n_neighbors=8, reg=1e-3)
     np.testing.assert_allclose(reconstruction_weights(U, 8).toarray(), theirs.toarray(), atol=1e-10)
 
@@ -46,6 +49,16 @@ def test_points_on_a_line_or_a_plane_are_rebuilt(dimensions):
     inside = ((grid > 1) & (grid < 7)).all(axis=1)
     C = reconstruction_weights(U, 4 if dimensions == 2 else 2)
     np.testing.assert_allclose((C @ U)[inside], U[inside], atol=1e-9)
+
+
+def test_memory_is_linear_in_the_points():
+    """Never a number for each pair of points and dimension: that would be 160 MB here."""
+    U = cloud(2000, 5)
+    tracemalloc.start()
+    reconstruction_weights(U, 8)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10e6
 
 
 def test_the_rebuilt_point_is_near_wherever_the_regularisation_is_felt():

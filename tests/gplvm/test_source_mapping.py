@@ -86,7 +86,7 @@ def test_the_energy_differs_from_equation_12_by_a_constant_alone(mapping):
     energies = [mapping.energy(row[None], observed)[0] for row in z]
     full = []
     for row in z:
-        x = mapping._expand(row[None], observed).x[0]
+        x = mapping._look(row[None], observed)[1][0]
         full.append(full_objective(mapping, x, row, frame))
     np.testing.assert_allclose(np.subtract(energies, full), 0.0, atol=1e-10)
 

@@ -140,6 +140,14 @@ def test_a_module_that_cannot_descend_further_is_told(optimiser):
     assert train(Bowl(), optimiser, monitor=Monitor(), **OPTIONS).status == "stalled"
 
 
+def test_the_decrease_is_judged_by_the_magnitude_that_is_given(optimiser):
+    """An objective that ends near zero would else be followed to its last digit."""
+    few = train(make_module(), optimiser, monitor=Monitor(), magnitude=1e9, **OPTIONS)
+    many = train(make_module(), optimiser, monitor=Monitor(), **OPTIONS)
+    assert few.status == many.status == "converged"
+    assert few.iterations < many.iterations
+
+
 @pytest.mark.parametrize(
     ("curve", "converged"),
     [

@@ -1,15 +1,23 @@
+import json
+import logging
+
+import ezc3d
 import numpy as np
 import pytest
 
 from facert.data import Rig, Source, Take
 from facert.errors import InputError
 from facert.io import formats
+from facert.io.glb import write_glb
+from facert.morphs import rig_morphs
 
 TAKE = Take(time=[0.0, 0.5], source=Source(np.array([[0.0], [1.0]]), ["jawOpen"]), fps=2.0)
 RIG = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))
 
 
-@pytest.mark.parametrize("name", ["take.h5", "take.HDF5", "take.csv", "take.livelink.csv"])
+@pytest.mark.parametrize(
+    "name", ["take.h5", "take.HDF5", "take.csv", "take.livelink.csv", "a.json"]
+)
 def test_the_ending_tells_the_format_of_a_take(tmp_path, name):
     path = tmp_path / name
     formats.write_take_file(TAKE, path)
@@ -53,3 +61,64 @@ def test_an_unknown_ending_is_refused_with_those_that_are_known(tmp_path, name):
     path.write_text("")
     with pytest.raises(InputError, match=r"\.npz"):
         formats.read_any(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("face.fbx", "Export it as .glb"),
+        ("face.mp4", "Track the face first"),
+        ("face.safetensors", "This is a model"),
+        ("face.usda", "export a .glb"),
+        ("face.obj", "Give the folder"),
+        ("face.dat", "Export it in one of these formats"),
+    ],
+)
+def test_a_file_of_another_kind_gets_advice(tmp_path, name, advice):
+    (tmp_path / name).write_text("x")
+    with pytest.raises(InputError, match=advice) as caught:
+        formats.read_take_file(tmp_path / name)
+    assert "Rename" not in str(caught.value)
+
+
+def write_c3d(path):
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [50.0]
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["a"]
+    file["data"]["points"] = np.ones((4, 1, 3))
+    file.write(str(path))
+
+
+TEXTS = {
+    "a.csv": "time,a\n0,1\n0.02,1\n0.04,1\n",
+    "a.json": json.dumps({"fps": 50, "names": ["a"], "weights": [[1]] * 3}),
+    "a.txt": "bs,a\n" + "".join(f"k,{20 * i},0,0,0,0,0,0,0,0,0,0,1\n" for i in range(3)),
+    "a.trc": "PathFileType\t4\nDataRate\n50\nFrame#\tTime\ta\n\n"
+    + "".join(f"{i}\t{i / 50}\t1\t1\t1\n" for i in range(3)),
+}
+
+
+@pytest.mark.parametrize("name", [*TEXTS, "a.c3d", "a.glb"])
+def test_the_same_performance_comes_out_of_every_format(tmp_path, name):
+    path = tmp_path / name
+    if name in TEXTS:
+        path.write_text(TEXTS[name])
+    elif name == "a.c3d":
+        write_c3d(path)
+    else:
+        rig = Rig(np.eye(3), np.ones((1, 3, 3)), ("a",), np.array([[0, 1, 2]]))
+        write_glb(rig_morphs(rig, np.ones((3, 1)), np.arange(3) / 50), path)
+    take = formats.read_take_file(path)
+    assert (take.source.names, take.fps) == (("a",), 50.0)
+    np.testing.assert_allclose(take.time, [0, 0.02, 0.04], atol=1e-8)
+    np.testing.assert_array_equal(take.source.matrix, np.ones((3, take.source.matrix.shape[1])))
+
+
+def test_of_a_glb_with_both_each_reader_gets_its_own(tmp_path, caplog):
+    caplog.set_level(logging.INFO, "facert")
+    write_glb(rig_morphs(RIG, np.ones((2, 1)), np.arange(2.0)), tmp_path / "face.glb")
+    assert formats.read_rig_file(tmp_path / "face.glb").names == ("jawOpen",)
+    assert formats.read_take_file(tmp_path / "face.glb").source.names == ("jawOpen",)
+    assert not caplog.records
+    assert isinstance(formats.read_any(tmp_path / "face.glb"), Rig)
+    assert "its animation is a take as well" in caplog.text

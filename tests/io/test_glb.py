@@ -114,6 +114,14 @@ def test_a_mesh_without_triangles_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_single_frame_is_how_the_mesh_is_seen(tmp_path: Path) -> None:
+    one = replace(MORPHS, weights=MORPHS.weights[3:4], time=MORPHS.time[3:4])
+    write_glb(one, tmp_path / "face.glb")
+    document = read(tmp_path / "face.glb")
+    assert "animations" not in document.json
+    assert document.json["meshes"][0]["weights"] == MORPHS.weights[3].tolist()
+
+
 VALIDATE = """
 const validator = require('gltf-validator'), fs = require('fs');
 validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])))
@@ -121,10 +129,13 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])))
 """
 
 
-def test_the_validator_of_khronos_finds_no_fault(path: Path) -> None:
+@pytest.mark.parametrize("frames", [20, 1])
+def test_the_validator_of_khronos_finds_no_fault(tmp_path: Path, frames: int) -> None:
     modules = os.environ.get("NODE_PATH", "")
     if not shutil.which("node") or not (Path(modules) / "gltf-validator").is_dir():
         pytest.skip("no gltf-validator: npm install it and set NODE_PATH to its node_modules")
+    path = tmp_path / "face.glb"
+    write_glb(replace(MORPHS, weights=MORPHS.weights[:frames], time=TIME[:frames]), path)
     result = subprocess.run(
         ["node", "-e", VALIDATE, str(path)], capture_output=True, text=True, check=True
     )

@@ -50,7 +50,7 @@ def test_raw_markers_and_weights_are_tracks_without_a_target(path):
 def test_a_rate_that_the_file_does_not_say_must_be_given(path):
     np.savez(path, positions=np.zeros((2, 1, 3)), names=["m"])
     assert read_npz_take(path, fps=50.0).time[1] == 0.02
-    with pytest.raises(InputError, match="--fps"):
+    with pytest.raises(InputError, match="--in-fps"):
         read_npz_take(path)
 
 

@@ -42,7 +42,7 @@ def test_a_weight_whose_name_ends_like_a_coordinate_is_a_weight(path):
 def test_frame_numbers_need_a_rate(path):
     path.write_text("frame,a\n10,1\n11,2\n")
     np.testing.assert_allclose(read_table(path, fps=20.0).time, [0.5, 0.55])
-    with pytest.raises(InputError, match="--fps"):
+    with pytest.raises(InputError, match="--in-fps"):
         read_table(path)
 
 

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
+from facert.errors import InputError
+from facert.gplvm import staging
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.metrics import rms
 from facert.optim.monitor import Monitor
 from facert.settings import Settings
 
@@ -49,6 +52,56 @@ def test_the_supervised_model_does_not_look_at_unlabelled_data():
     assert len(a.source_.Z) == len(a.target_.Z) == 10
 
 
+@pytest.mark.parametrize("likelihood", ["vfe", "fitc"])
+def test_through_inducing_latents_the_model_foretells_nearly_the_same(method, likelihood):
+    sparse = fitted(likelihood=likelihood, inducing=20)
+    frames = make_data()[1].X
+    exact, other = method.predict(frames), sparse.predict(frames)
+    assert rms(other.Y - exact.Y) < 0.15 * exact.Y.std()
+    assert rms(other.X - exact.X) < 0.15 * exact.X.std()
+
+
+def test_a_small_set_is_learned_exactly_and_a_large_one_through_inducing_latents():
+    small, large = fitted(), fitted(data=make_data(alone=110), inducing=15, max_iterations=15)
+    assert small.save()["source.observations"].shape == (25, 9)
+    shapes = {name: array.shape for name, array in large.save().items()}
+    assert shapes["source.latents"] == shapes["target.latents"] == (15, 3)
+    assert shapes["source.whitener"] == (15, 15)
+    assert shapes["target.weights"] == (15, 4)
+    assert not any("observations" in name for name in shapes)
+
+
+def test_a_large_set_of_labels_needs_no_others(monkeypatch):
+    monkeypatch.setattr(staging, "CORE_LABELS", 40)
+    labelled, unlabelled = make_data(labelled=90, alone=0)
+    made = fitted("sgplvm", (labelled, unlabelled), inducing=30)
+    assert made.source_.Z.shape == (30, 3)
+    assert np.abs(made.predict(labelled.X).Y - labelled.Y).mean() < 0.2 * labelled.Y.std()
+
+
+def test_a_sparse_model_is_the_same_after_saving_and_loading():
+    made = fitted(likelihood="vfe", inducing=12)
+    again = make_method(made.settings)
+    again.load(made.save())
+    same(again.predict(make_data()[1].X), made.predict(make_data()[1].X))
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "said"),
+    [
+        ("source.whitener", lambda a: a[:-1], "expected 12 for m"),
+        ("target.weights", lambda a: a[:0], "expected an array of 2 dimensions"),
+        ("source.kernel", lambda a: -a, "expected three positive numbers"),
+    ],
+)
+def test_a_damaged_sparse_model_is_refused(name, damage, said):
+    made = fitted(likelihood="vfe", inducing=12, max_iterations=2)
+    arrays = made.save()
+    arrays[name] = damage(arrays[name])
+    with pytest.raises(InputError, match=f"{name}: {said}"):
+        make_method(made.settings).load(arrays)
+
+
 def test_three_labels_suffice(caplog):
     labelled, _ = make_data()
     data = Labelled(labelled.X[:3], labelled.Y[:3]), Unlabelled(labelled.X[:0], labelled.Y[:0])
@@ -90,6 +143,8 @@ def test_the_fingerprint_tells_runs_apart_by_data_and_by_what_shapes_the_model()
         fingerprint(checkpoint_every=7),
         fingerprint(sigma_c=0.2),
         fingerprint(optimizer="scg"),
+        fingerprint(likelihood="vfe"),
+        fingerprint(inducing=7),
         fingerprint(method="sgplvm"),
     ]
     assert len({fingerprint(), *others}) == len(others) + 1

@@ -158,8 +158,3 @@ def test_the_start_is_not_changed(optimiser):
     x = np.array([-1.2, 1.0])
     minimise(optimiser, rosenbrock, x, 20)
     np.testing.assert_array_equal(x, [-1.2, 1.0])
-
-
-def test_lbfgs_stays_in_its_box():
-    found = minimise(LBFGS(bound=2.0), lambda x: (float(x.sum()), np.ones_like(x)), np.zeros(3))
-    np.testing.assert_array_equal(found.x, -2.0)

@@ -1,0 +1,117 @@
+"""What a person changes about single controls: gain, limits, how much is smoothed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.errors import InputError
+from facert.names import match
+
+LARGEST = 1e6
+"""Beyond, a gain or a limit is a slip of the pen."""
+ENTRIES = ("gain", "limits", "smoothing")
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustments:
+    """For every control of a character.
+
+    Parameters
+    ----------
+    gain : array, shape (P,)
+        Values are multiplied by it.
+    limits : array, shape (P, 2)
+        Then clipped to these; infinite where nothing is clipped.
+    smoothing : array, shape (P,)
+        From 0, a control follows the measured source, to 1, it follows the cleaned one.
+    """
+
+    gain: FloatArray
+    limits: FloatArray
+    smoothing: FloatArray
+
+    @classmethod
+    def none(cls, controls: int) -> Adjustments:
+        """That change nothing."""
+        return cls(np.ones(controls), np.tile([-np.inf, np.inf], (controls, 1)), np.ones(controls))
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], names: Sequence[str]) -> Adjustments:
+        """From a table for each control, as in a TOML file.
+
+        Parameters
+        ----------
+        tables : mapping
+            ``{"jawOpen": {"gain": 1.1, "limits": [0.0, 0.9], "smoothing": 0.5}}``; a name may
+            have wildcards, ``"eyeBlink*"``. What a later table says of a control holds.
+        names : sequence of str
+            Of the character's controls.
+
+        Raises
+        ------
+        InputError
+            For unknown names or entries, and values that make no sense.
+        """
+        made = cls.none(len(names))
+        for name, table in tables.items():
+            if not isinstance(table, Mapping):
+                raise InputError(name, "a table such as [jawOpen]", repr(table), "Write a table.")
+            unknown = [entry for entry in table if entry not in ENTRIES]
+            if unknown:
+                expected = "one of " + ", ".join(ENTRIES)
+                raise InputError(f"{name}.{unknown[0]}", expected, "another entry", "Remove it.")
+            columns = _columns(name, names)
+            if "gain" in table:
+                made.gain[columns] = _number(name, table, "gain", -LARGEST, LARGEST)
+            if "limits" in table:
+                made.limits[columns] = _limits(name, table)
+            if "smoothing" in table:
+                made.smoothing[columns] = _number(name, table, "smoothing", 0.0, 1.0)
+        return made
+
+    @property
+    def smooth_all(self) -> bool:
+        """Whether every control follows the cleaned source alone."""
+        return bool((self.smoothing == 1.0).all())
+
+    def apply(self, params: FloatArray) -> FloatArray:
+        """Values (T, P) with gain and limits."""
+        return np.clip(params * self.gain, *self.limits.T)
+
+    def mixed(self, smooth: FloatArray, rough: FloatArray) -> FloatArray:
+        """What follows the cleaned source and what follows the measured one, (T, P) each."""
+        return np.asarray(self.smoothing * smooth + (1.0 - self.smoothing) * rough)
+
+
+def _columns(pattern: str, names: Sequence[str]) -> list[int]:
+    """The controls that a name, or a name with wildcards, stands for."""
+    if "*" not in pattern:
+        return [int(index) for index in match([pattern], names, "the controls' adjustments")]
+    found = [index for index, name in enumerate(names) if fnmatchcase(name, pattern)]
+    if not found:
+        raise InputError(pattern, "a pattern that some control fits", "none", "Check the names.")
+    return found
+
+
+def _number(name: str, table: Mapping[str, Any], entry: str, low: float, high: float) -> float:
+    value = table[entry]
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        expected = f"a number from {low:g} to {high:g}"
+        raise InputError(f"{name}.{entry}", expected, repr(value), "Change it.")
+    return float(value)
+
+
+def _limits(name: str, table: Mapping[str, Any]) -> tuple[float, float]:
+    value = table["limits"]
+    numbers = isinstance(value, list) and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) <= LARGEST for v in value
+    )
+    if not numbers or len(value) != 2 or not value[0] <= value[1]:
+        raise InputError(f"{name}.limits", "[low, high]", repr(value), "For instance [0.0, 1.0].")
+    return float(value[0]), float(value[1])

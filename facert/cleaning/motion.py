@@ -1,0 +1,186 @@
+"""How a source moves: what tells a frame from its neighbours in time, through noise and gaps.
+
+Two layers, each smooth in time: the few factors that move the face, estimated over all frames
+together from whatever each shows, and what of every column they leave over, which tells between
+one sight of a marker and the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from facert.cleaning.factors import Factors
+from facert.cleaning.interpolation import interpolated
+from facert.cleaning.matern import QUICKEST, decay
+from facert.cleaning.smoothing import Smoothed, smooth_factors, smooth_series
+from facert.data import FloatArray, IntArray
+from facert.learned import Arrays
+
+FACTORS = 16
+FIT = 1000
+"""Frames that the factors are learned from, at most, evenly spread."""
+START = 0.95
+"""Correlation of a factor in neighbouring frames, to begin with."""
+STRETCH, STRETCHES, ROUNDS = 40, 25, 3
+"""How quickly factors move is learned from so many stretches of so many frames, in rounds."""
+SHOWN = 0.5
+"""Stretches that show less than this share of what the best one shows are passed over."""
+PART, OVERLAP = 5000, 500
+"""Frames that are smoothed at once, and how many around them; the slowest motion is forgotten by
+then."""
+LEAST_VARIANCE = 1e-6
+"""Of what is peculiar to a column, normalised units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(Arrays):
+    """How normalised frames move, learned from a take.
+
+    Parameters
+    ----------
+    factors : Factors
+        Of unit variance each; their noise is what else is in a column, without capture noise.
+    rates : array, shape (q,)
+        How quickly each factor moves, see `facert.cleaning.matern`.
+    rest, rest_rates : array, shape (d,)
+        Variance and rate of what the factors leave over of each column.
+    clock : array, shape (2,)
+        Seconds from frame to frame, which the rates are for, and the standard deviation of the
+        capture noise.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"rates": "q", "rest": "x", "rest_rates": "x", "clock": "2"}
+    parts: ClassVar[Mapping[str, type[Arrays]]] = {"factors": Factors}
+
+    factors: Factors
+    rates: FloatArray
+    rest: FloatArray
+    rest_rates: FloatArray
+    clock: FloatArray
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the capture noise of the take it was learned from."""
+        return float(self.clock[1])
+
+    def every(self, seconds: float) -> Motion:
+        """For frames that come so far apart in time."""
+        ratio = seconds / self.clock[0]
+        return replace(
+            self,
+            rates=np.minimum(self.rates * ratio, QUICKEST),
+            rest_rates=np.minimum(self.rest_rates * ratio, QUICKEST),
+            clock=np.array([seconds, self.sigma]),
+        )
+
+    @classmethod
+    def learned(cls, X: FloatArray, sigma: float, seconds: float = 1.0) -> Motion:
+        """From a take.
+
+        Parameters
+        ----------
+        X : array, shape (T, d)
+            Normalised frames, evenly spaced in time; NaN: not observed. Every column was seen.
+        sigma : float
+            Standard deviation of the capture noise.
+        seconds : float
+            From frame to frame.
+        """
+        seen = ~np.isnan(X)
+        some = _spread(np.flatnonzero(seen.any(axis=1)), FIT)
+        some = some if seen[some].any(axis=0).all() else np.arange(len(X))
+        filled = interpolated(X, np.arange(len(X), dtype=np.float64))
+        factors = Factors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
+        factors, rates, left = _paced(factors, X)
+        own, clock = factors.with_noise(-(sigma**2), LEAST_VARIANCE), np.array([seconds, sigma])
+        return cls(own, rates, *_rest(left, sigma), clock)
+
+    def seen_with(self, sigma: float) -> Factors:
+        """The factors as a capture with noise of this standard deviation shows them."""
+        return self.factors.with_noise(sigma**2)
+
+    def smooth(self, X: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance (T, d) of what all frames together tell of each; see `learned`.
+
+        Long takes are done in parts that overlap, so that memory stays bounded.
+        """
+        parts = []
+        for start in range(0, len(X), PART):
+            first = max(start - OVERLAP, 0)
+            part = self._smooth(X[first : start + PART + OVERLAP], sigma)
+            parts.append([values[start - first :][:PART] for values in part])
+        mean, variance = (np.concatenate(values) for values in zip(*parts, strict=True))
+        return mean, variance
+
+    def _smooth(self, X: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+        seen = ~np.isnan(X)
+        factors = self.seen_with(sigma)
+        found = smooth_factors(*factors.information(X), self.rates)
+        frames = factors.frames(found.mean)
+        left = np.where(seen, X - frames, np.nan)
+        rest, doubt = smooth_series(left, seen, self.rest, sigma**2, self.rest_rates)
+        variance = factors.variance(found.covariance) + doubt
+        # The layers take each other for noise: of what was seen, both know less than it told.
+        return frames + rest, np.where(seen, np.minimum(variance, sigma**2), variance)
+
+
+def _spread(indices: IntArray, most: int) -> IntArray:
+    """So many of them at most, evenly spread."""
+    count = len(indices)
+    return indices[np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))]
+
+
+def _paced(factors: Factors, X: FloatArray) -> tuple[Factors, FloatArray, FloatArray]:
+    """The factors in units of their deviation, how quickly each moves, and what they leave over.
+
+    The latter of stretches of the take, (length, stretches, d).
+    """
+    length = min(STRETCH, len(X))
+    shown = np.lib.stride_tricks.sliding_window_view((~np.isnan(X)).mean(axis=1), length)
+    starts = np.arange(len(shown))
+    starts = _spread(starts[shown.mean(axis=1) >= SHOWN * shown.mean(axis=1).max()], STRETCHES)
+    windows = X[starts + np.arange(length)[:, None]]
+    rates = decay(np.full(factors.count, START))
+    for _ in range(ROUNDS):
+        found = _smoothed(factors, windows, rates)
+        square = _squares(found)
+        rates = decay(found.following.mean(axis=(0, 1)) / square)
+        factors = factors.scaled(np.sqrt(square))
+    return factors, rates, windows - factors.frames(_smoothed(factors, windows, rates).mean)
+
+
+def _smoothed(factors: Factors, windows: FloatArray, rates: FloatArray) -> Smoothed:
+    """The factors of stretches (length, stretches, d), each on its own."""
+    shape, q = windows.shape[:2], factors.count
+    precision, pull = factors.information(windows.reshape(-1, windows.shape[2]))
+    return smooth_factors(precision.reshape(*shape, q, q), pull.reshape(*shape, q), rates)
+
+
+def _squares(found: Smoothed) -> FloatArray:
+    """Mean square of each factor, (q,)."""
+    own = np.diagonal(found.covariance, axis1=-2, axis2=-1)
+    return np.asarray((found.mean**2 + own).mean(axis=(0, 1)))
+
+
+def _rest(left: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+    """Variance and rate of what the factors leave over, from stretches (length, stretches, d).
+
+    A column that no stretch shows is taken to be like the others.
+    """
+    variance = _mean_square(left) - sigma**2
+    variance = np.maximum(np.where(np.isnan(variance), np.nanmedian(variance), variance), 0.0)
+    variance = np.maximum(variance, max(sigma**2 * 1e-2, LEAST_VARIANCE))
+    rough = np.maximum(_mean_square(np.diff(left, axis=0)) / 2.0 - sigma**2, 0.0)
+    return variance, decay(1.0 - np.where(np.isnan(rough), variance, rough) / variance)
+
+
+def _mean_square(values: FloatArray) -> FloatArray:
+    """Of the numbers in each column of (..., d), (d,); NaN where there is none."""
+    known = ~np.isnan(values)
+    count = known.sum(axis=(0, 1))
+    total = (np.where(known, values, 0.0) ** 2).sum(axis=(0, 1))
+    return np.asarray(np.where(count, total, np.nan) / np.maximum(count, 1))

@@ -1,0 +1,157 @@
+"""Several files at once: what goes where, a status line for each, and none stops the others."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import typer
+
+from facert.cli import console
+from facert.errors import FacertError, InputError, OutputExistsError
+
+Work = Callable[[Path, Path], None]
+"""Makes one file from another; must be picklable where there are several jobs."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The files to read, and what to write for each.
+
+    Parameters
+    ----------
+    pairs : tuple of (Path, Path)
+    many : bool
+        Whether a folder was asked for: failures are then told line by line.
+    """
+
+    pairs: tuple[tuple[Path, Path], ...]
+    many: bool
+
+
+def plan(paths: Sequence[Path], out_dir: Path | None, ending: str, overwrite: bool) -> Plan:
+    """What to do.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        IN and OUT; or with `out_dir` any number of files, and folders whose takes are all meant.
+    out_dir : Path or None
+        Each result goes here, named after its source.
+    ending : str
+        Of the results in `out_dir`, e.g. ``".h5"``.
+    overwrite : bool
+
+    Raises
+    ------
+    InputError
+        When there is nothing to do, or two results would have the same name.
+    OutputExistsError
+        For a single OUT that exists.
+    """
+    if out_dir is None:
+        if len(paths) != 2:
+            raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
+        if paths[1].exists() and not overwrite:
+            raise OutputExistsError(paths[1])
+        return Plan(((paths[0], paths[1]),), many=False)
+    sources = [file for path in paths for file in _files(path)]
+    outputs = [out_dir / (_stem(source) + ending) for source in sources]
+    twice = [name for name in outputs if outputs.count(name) > 1]
+    if twice:
+        raise InputError(
+            "--out-dir", "files with a name each", f"two for {twice[0].name}", "Rename one."
+        )
+    inputs = {source.resolve() for source in sources}
+    lost = [name for name in outputs if name.resolve() in inputs]
+    if lost:
+        raise InputError(
+            "--out-dir", "another folder than that of the takes", str(lost[0]), "Give another."
+        )
+    out_dir.mkdir(parents=True, exist_ok=True)
+    return Plan(tuple(zip(sources, outputs, strict=True)), many=True)
+
+
+def carry_out(todo: Plan, work: Work, jobs: int, overwrite: bool) -> None:
+    """Do it, several files at a time if asked; ends the command with status 1 if any failed."""
+    if not todo.many:
+        (pair,) = todo.pairs
+        work(*pair)
+        return
+    wanted = [pair for pair in todo.pairs if overwrite or not pair[1].exists()]
+    for source, output in todo.pairs:
+        if (source, output) not in wanted:
+            _tell("exists", f"{source}: {output} is there; --overwrite makes it anew")
+    failed = 0
+    for source, error in _outcomes(wanted, work, jobs):
+        failed += error is not None
+        _tell("failed" if error else "done", error or str(source))
+    if failed:
+        console.err.print(f"{failed} of {len(wanted)} files failed", style="red")
+        raise typer.Exit(1)
+
+
+def _outcomes(
+    pairs: Sequence[tuple[Path, Path]], work: Work, jobs: int
+) -> Iterator[tuple[Path, str | None]]:
+    """Each source with what went wrong, as they finish."""
+    if jobs == 1 or len(pairs) < 2:
+        for pair in pairs:
+            yield pair[0], _attempt(work, *pair)
+        return
+    # Spawned, not forked: BLAS and torch have threads of their own.
+    count = min(jobs or os.cpu_count() or 1, len(pairs))
+    with ProcessPoolExecutor(
+        count, get_context("spawn"), initializer=_begin, initargs=(console.log.level,)
+    ) as pool:
+        running = {pool.submit(_attempt, work, *pair): pair[0] for pair in pairs}
+        for done in as_completed(running):
+            yield running[done], done.result()
+
+
+def _begin(level: int) -> None:
+    """A process of its own logs as much as the first one."""
+    console.configure(quiet=False, verbose=False)
+    console.log.setLevel(level)
+
+
+def _attempt(work: Work, source: Path, output: Path) -> str | None:
+    """What went wrong, in one line; None when nothing did."""
+    try:
+        work(source, output)
+    except FacertError as error:
+        text = str(error)
+    except OSError as error:
+        text = error.strerror or str(error)
+    except Exception as error:  # whatever is wrong with one file, the others are done
+        text = f"unexpected {type(error).__name__}: {error}"
+    else:
+        return None
+    return text if str(source) in text else f"{source}: {text}"
+
+
+def _tell(status: str, text: str) -> None:
+    console.out.print(f"{status:7s} {text}", markup=False)
+
+
+def _files(path: Path) -> list[Path]:
+    """A file, or the takes in a folder."""
+    if not path.is_dir():
+        return [path]
+    from facert.io.formats import TAKE_ENDINGS
+
+    found = sorted(
+        file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TAKE_ENDINGS
+    )
+    if not found:
+        raise InputError("the folder", "takes", "none", "Give a folder with takes.", str(path))
+    return found
+
+
+def _stem(path: Path) -> str:
+    """The name without its ending, also without a double one such as ``.livelink.csv``."""
+    return path.name.removesuffix(path.suffix).removesuffix(".livelink")

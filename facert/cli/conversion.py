@@ -1,0 +1,130 @@
+"""Converting one file to another, as `convert` does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from facert.conversion import Changes, converted
+from facert.data import Rig, Take
+from facert.errors import InputError, OutputExistsError, reading
+from facert.io import formats, usd
+from facert.io.glb import write_glb
+from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
+from facert.labelling import weights_as_poses
+from facert.morphs import Morphs, compact_morphs, rig_morphs
+from facert.view.faces import control_settings
+
+if TYPE_CHECKING:
+    from facert.io.formats import Kind
+
+MORPH_ENDINGS = (".glb", *usd.ENDINGS)
+ENDINGS = (*formats.HDF5_ENDINGS, ".livelink.csv", ".csv", ".json", *MORPH_ENDINGS)
+_OF_A_RIG = (*formats.HDF5_ENDINGS, *MORPH_ENDINGS)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to read of the input: see `facert.io.formats.read_any`; and the rig of a take."""
+
+    kind: Kind | None = None
+    target: str | None = None
+    shapes: str | None = None
+    fps: float | None = None
+    rig: Path | None = None
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Morph targets, and what they are timed and placed by."""
+
+    morphs: Morphs
+    fps: float = 30.0
+    up_axis: str = ""
+
+
+def convert_file(
+    source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool = False
+) -> str:
+    """Convert a file; return what was written, in words.
+
+    Raises
+    ------
+    InputError
+        When the input is bad, or the output cannot hold it.
+    OutputExistsError
+        When `output` exists and `overwrite` is not set.
+    """
+    if not output.name.lower().endswith(ENDINGS):
+        raise formats.unknown_output(output, ", ".join(ENDINGS))
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+    if holds_mesh_sequence(source):
+        return _convert_sequence(source, output, changes, overwrite)
+    found = _read(source, output, wanted, changes)
+    with reading(source):
+        found = converted(found, changes)
+        if isinstance(found, Rig):
+            return _write_rig(found, output, overwrite)
+        if output.suffix.lower() in MORPH_ENDINGS:
+            return _write_motion(_motion(found, wanted), output, overwrite)
+    formats.write_take_file(found, output, overwrite)
+    return (
+        f"a take with {len(found)} frames of {len(found.source.names)} {found.source.kind}"
+        f" and {len(found.labels)} poses"
+    )
+
+
+def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take | Rig:
+    """The take or the rig of a file; of one with both, the take where only that makes sense."""
+    kind = wanted.kind
+    no_rig = output.suffix.lower() not in _OF_A_RIG
+    if kind is None and (wanted.rig or changes.of_frames or no_rig):
+        kind = "take"
+    return formats.read_any(source, wanted.target, wanted.shapes, wanted.fps, kind)
+
+
+def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: bool) -> str:
+    if changes != Changes():
+        raise InputError(
+            "options", "none that change a take", "a mesh sequence", "Leave them out.", str(source)
+        )
+    if output.suffix.lower() not in MORPH_ENDINGS:
+        raise formats.unknown_output(output, ", ".join(MORPH_ENDINGS))
+    with open_mesh_sequence(source) as sequence:
+        motion = _Motion(compact_morphs(sequence), sequence.fps)
+    return _write_motion(motion, output, overwrite)
+
+
+def _motion(take: Take, wanted: Wanted) -> _Motion:
+    """The rig in the poses of a take, or as its tracked weights move it."""
+    if wanted.rig is None:
+        raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
+    rig = formats.read_rig_file(wanted.rig, wanted.shapes)
+    if not len(take.labels) and take.source.kind == "weights":
+        take = weights_as_poses(take, rig)
+    settings = control_settings(take, rig, range(len(take)))
+    return _Motion(rig_morphs(rig, settings, take.time), take.fps)
+
+
+def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:
+    if output.suffix.lower() in MORPH_ENDINGS:
+        rest = np.zeros((1, len(rig.names)))
+        still = Morphs(rig.mesh, rig.shapes, rig.names, rest, np.zeros(1))
+        _write_motion(_Motion(still), output, overwrite)
+    else:
+        formats.write_rig_file(rig, output, overwrite)
+    return f"a rig with {len(rig.neutral)} vertices and {len(rig.names)} shapes"
+
+
+def _write_motion(motion: _Motion, output: Path, overwrite: bool) -> str:
+    morphs = motion.morphs
+    if output.suffix.lower() == ".glb":
+        write_glb(morphs, output, overwrite)
+    else:
+        usd.write_usd(morphs, output, motion.fps, motion.up_axis, overwrite)
+    error = f", off by {morphs.error:.2g} at most" if morphs.error else ""
+    return f"{len(morphs.time)} frames of {len(morphs.targets)} morph targets{error}"

@@ -1,0 +1,41 @@
+"""``facert export-script``: a script that brings curves into another program."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Program(StrEnum):
+    """Programs that there is a script for."""
+
+    blender = "blender"
+    maya = "maya"
+
+
+def command(
+    program: Annotated[Program, typer.Argument(metavar="blender|maya")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write it here instead of to stdout.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+) -> None:
+    """Print a Python script that keys a character with curves (.json or .csv) of facert.
+
+    It keys the shape keys of a Blender object, or the attributes of a Maya node, by time, and
+    says at its top how to run it.
+    """
+    from facert.cli import console
+    from facert.importers import script
+    from facert.io.atomic import replacing
+
+    text = script(program.value)
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    with replacing(output, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    console.out.print(f"wrote {output}", markup=False)

@@ -1,0 +1,200 @@
+"""``facert live``: a performance retargeted while it is played."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from facert.cli import console
+from facert.cli.options import CONTROLS, NO_DETECT, NO_SMOOTH, chosen_handling
+from facert.cli.train import DEFAULT_MODEL
+
+if TYPE_CHECKING:
+    from facert.live.endpoints import Address, File
+    from facert.live.frames import Counters, Receiver
+    from facert.live.senders import UdpSender
+    from facert.retargeter import Retargeter
+
+_Parsed = TypeVar("_Parsed")
+
+
+def command(
+    source: Annotated[
+        str,
+        typer.Option(
+            "--in",
+            metavar="KIND[:PORT]",
+            help="livelink:11111 (Live Link Face), vmc:39540, osc:9000, ifacialmocap:49983, "
+            "or take:FILE, played in real time.",
+        ),
+    ],
+    outputs: Annotated[
+        list[str],
+        typer.Option(
+            "--out",
+            metavar="KIND[:HOST[:PORT]]",
+            help="vmc:127.0.0.1:39539, osc:HOST:PORT, livelink:HOST:PORT, csv:FILE or h5:FILE; "
+            "again for more.",
+        ),
+    ],
+    model: Annotated[
+        Path,
+        typer.Option("--model", "-m", help="Model file; a new one is taken over when it changes."),
+    ] = DEFAULT_MODEL,
+    listen: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Where to listen: by default to this machine alone; 0.0.0.0 for a phone.",
+        ),
+    ] = "127.0.0.1",
+    speed: Annotated[float, typer.Option(min=0.01, max=100, help="Of a played take.")] = 1.0,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+    controls_path: CONTROLS = None,
+    no_detect: NO_DETECT = False,
+    no_smooth: NO_SMOOTH = False,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Take of what comes in: .h5, .csv, .livelink.csv."),
+    ] = None,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="Stop after so many; else Ctrl-C does.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The summary, for programs.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace recorded files.")] = False,
+) -> None:
+    """Retarget frame after frame as they come in, and send each pose at once.
+
+    A status line shows rate, latency, and packets that were dropped or bad. Files are written at
+    the end.
+    """
+    from facert.cli.live_status import Status, print_summary
+    from facert.errors import reading
+    from facert.live.endpoints import File, parse_input, parse_output
+    from facert.live.loop import Limits, Session
+    from facert.live.model import LiveModel, ModelFile
+    from facert.live.recording import Recordings
+
+    begin, ends = _parsed(parse_input, source), [_parsed(parse_output, one) for one in outputs]
+    file = ModelFile(model)
+    retargeter = file.load()
+    with ExitStack() as stack:
+        receiver = _open_receiver(begin, listen, _Played(speed, target), retargeter)
+        stack.callback(receiver.close)
+        controls, pattern = retargeter.controls, receiver.pattern
+        recordings = Recordings(pattern, retargeter.source_names, controls, overwrite)
+        stack.callback(recordings.close)
+        kept = recordings.source(record) if record else None
+        files = [recordings.poses(end.path) for end in ends if isinstance(end, File)]
+        senders = _open_senders(stack, ends, controls.names, receiver.counters)
+        with reading(source):
+            handling = partial(
+                chosen_handling, controls=controls_path, no_detect=no_detect, no_smooth=no_smooth
+            )
+            mapping = LiveModel(file, retargeter, pattern, receiver.fps, handling)
+            stack.enter_context(mapping)
+        session = Session(receiver, mapping.step, senders, files, kept)
+        stopped = stack.enter_context(_stopping())
+        stack.enter_context(_settled())
+        status = stack.enter_context(Status(session))
+        _announce(begin, listen, receiver)
+        try:
+            session.run(Limits.of(frames, seconds), stopped, status.show)
+        finally:  # a performance is not to be had again
+            written = recordings.write(receiver.start_timecode)
+    print_summary(session, written, as_json)
+
+
+@dataclass(frozen=True)
+class _Played:
+    """How a take is played."""
+
+    speed: float
+    target: str | None
+
+
+def _parsed(parse: Callable[[str], _Parsed], text: str) -> _Parsed:
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _open_receiver(
+    begin: Address | File, listen: str, played: _Played, retargeter: Retargeter
+) -> Receiver:
+    from facert.io.formats import read_take_file
+    from facert.live.endpoints import File, open_receiver
+    from facert.live.frames import frame_pattern
+    from facert.live.receivers import TakeReceiver
+
+    if isinstance(begin, File):
+        return TakeReceiver(read_take_file(begin.path, played.target), played.speed)
+    wanted = frame_pattern(retargeter.source_names, retargeter.source_kind, retargeter.units)
+    return open_receiver(begin, listen, wanted)
+
+
+def _open_senders(
+    stack: ExitStack, ends: Sequence[Address | File], controls: tuple[str, ...], counters: Counters
+) -> list[UdpSender]:
+    from facert.live.endpoints import Address, open_sender
+
+    senders = []
+    for end in ends:
+        if isinstance(end, Address):
+            senders.append(open_sender(end, controls, counters))
+            stack.callback(senders[-1].close)
+    return senders
+
+
+def _announce(begin: Address | File, listen: str, receiver: Receiver) -> None:
+    from facert.live.endpoints import LOOPBACK
+    from facert.live.receivers import UdpReceiver
+
+    if isinstance(receiver, UdpReceiver):
+        alone = " (this machine alone; --listen 0.0.0.0 for others)" if listen == LOOPBACK else ""
+        place = f"{listen}:{receiver.port}{alone}"
+        console.log.info("listens for %s on %s", begin.kind, place)
+
+
+@contextmanager
+def _stopping() -> Iterator[Callable[[], bool]]:
+    """Let Ctrl-C, and a request to end, stop the session; a second Ctrl-C stops at once."""
+    asked = threading.Event()
+    before: dict[int, Any] = {}
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        asked.set()
+        signal.signal(number, before[number] or signal.SIG_DFL)
+
+    for one in (signal.SIGINT, signal.SIGTERM):
+        before[one] = signal.signal(one, stop)
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """Keep the garbage collector off what was loaded: a look at all of it takes milliseconds."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

@@ -1,0 +1,119 @@
+"""How a live session goes: a line on the terminal, or in the log now and then; a summary."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import typer
+from rich.live import Live
+
+from facert.cli import console
+from facert.live.frames import Counters
+from facert.live.loop import Session
+from facert.live.meter import RECENT, Pace
+
+ON_TERMINAL = 0.25
+"""Seconds between two status lines that replace each other."""
+IN_LOG = 10.0
+"""Seconds between two status lines that stay."""
+_QUIET = 2.0
+
+
+class Status:
+    """Shows how the session goes, while it is entered."""
+
+    def __init__(self, session: Session) -> None:
+        wanted = console.log.isEnabledFor(logging.INFO)
+        self._session = session
+        self._live = Live(console=console.err, auto_refresh=False, transient=True)
+        self._on_terminal = wanted and console.err.is_terminal
+        self._every = ON_TERMINAL if self._on_terminal else IN_LOG
+        self._next = time.monotonic() + self._every
+        self._seen, self._seen_at = -1, 0.0
+
+    def __enter__(self) -> Status:
+        if self._on_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._on_terminal:
+            self._live.stop()
+
+    def show(self) -> None:
+        """Show the line if it is time."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + self._every
+        line = self._line(now)
+        if self._on_terminal:
+            self._live.update(line, refresh=True)
+        else:
+            console.log.info("%s", line)
+
+    def _line(self, now: float) -> str:
+        counters = self._session.counters
+        if counters.received != self._seen:
+            self._seen, self._seen_at = counters.received, now
+        waiting = not counters.received or now - self._seen_at > _QUIET
+        pace = "waits for frames" if waiting else _pace(self._session.meter.pace(RECENT))
+        return f"{pace}   {_counts(counters)}"
+
+
+def print_summary(session: Session, written: Sequence[Path], as_json: bool) -> None:
+    """Say what happened, on stdout."""
+    pace = session.meter.pace()
+    if as_json:
+        typer.echo(json.dumps(_facts(session.counters, pace, written), indent=2))
+        return
+    if session.counters.mapped:
+        console.out.print(_pace(pace))
+    console.out.print(f"{session.counters.received} received, {_counts(session.counters)}")
+    for path in written:
+        console.out.print(f"wrote {path}", markup=False)
+
+
+def _pace(pace: Pace) -> str:
+    rate = f"{pace.rate:.1f} frames/s, " if math.isfinite(pace.rate) else ""
+    return f"{rate}latency {pace.median:.2f} ms, p99 {pace.p99:.2f} ms"
+
+
+def _counts(counters: Counters) -> str:
+    """The counters: those that every session has, and others when there is something to say."""
+    always = f"{counters.mapped} mapped, {counters.dropped} dropped, {counters.bad} bad"
+    others = {
+        "late or double": counters.late,
+        "without a face": counters.hidden,
+        "without a pose": counters.failed,
+        "not sent": counters.unsent,
+    }
+    return ", ".join([always, *(f"{count} {name}" for name, count in others.items() if count)])
+
+
+def _facts(counters: Counters, pace: Pace, written: Sequence[Path]) -> dict[str, Any]:
+    latency = {"median": pace.median, "p99": pace.p99, "worst": pace.worst}
+    return {
+        **asdict(counters),
+        "rate": _plain(pace.rate),
+        "latency_ms": {name: _plain(value) for name, value in latency.items()},
+        "files": [str(path) for path in written],
+    }
+
+
+def _plain(value: float) -> float | None:
+    """JSON has no NaN."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,62 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from facert.handling import Handling
+    from facert.retargeter import Retargeter
+
+CONTROLS = Annotated[
+    Path | None,
+    typer.Option(
+        "--controls", help="TOML file with gain, limits and smoothing of single controls."
+    ),
+]
+NO_DETECT = Annotated[
+    bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
+]
+NO_SMOOTH = Annotated[bool, typer.Option("--no-smooth", help="Map every frame as it was measured.")]
+OUT_DIR = Annotated[
+    Path | None,
+    typer.Option("--out-dir", help="Folder for the results of several takes, named after them."),
+]
+ENDING = Annotated[
+    str, typer.Option("--ending", help="Of the files in --out-dir, which tells their format.")
+]
+JOBS = Annotated[
+    int, typer.Option("--jobs", "-j", min=0, help="Takes at a time; 0: one a processor core.")
+]
+
+
+def chosen_handling(
+    retargeter: Retargeter,
+    *,
+    controls: Path | None,
+    no_detect: bool,
+    no_smooth: bool,
+    sigma: float | None = None,
+    neutral: str | None = None,
+) -> Handling:
+    """What the options ask for, of a take that goes through this model."""
+    from facert.adjustments import Adjustments
+    from facert.errors import reading
+    from facert.handling import Handling
+    from facert.io.toml import read_toml
+    from facert.ranges import parse_frames
+
+    adjustments = None
+    if controls is not None:
+        with reading(controls):
+            adjustments = Adjustments.of(read_toml(controls), retargeter.controls.names)
+    return Handling(
+        detect=not no_detect,
+        smooth=not no_smooth,
+        sigma=sigma,
+        neutral=None if neutral is None else parse_frames(neutral, "--neutral"),
+        adjustments=adjustments,
+    )

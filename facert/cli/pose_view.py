@@ -1,0 +1,93 @@
+"""``facert pose --view``: pose a character in the browser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from facert.cli import console
+from facert.cli.train import DEFAULT_MODEL
+from facert.errors import InputError, OutputExistsError, reading
+
+if TYPE_CHECKING:
+    from facert.data import Rig, Take
+    from facert.pages.session import Session
+    from facert.retargeter import Retargeter
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the user named, as in the options of ``facert pose``."""
+
+    rig: Path | None
+    take: Path | None
+    model: Path | None
+    actor: Path | None
+    output: Path | None
+    target: str | None
+    shapes: str | None
+
+
+def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
+    """Serve the page until Ctrl-C."""
+    from facert.io.formats import read_rig_file, read_take_file
+    from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
+
+    require_viser()
+    from facert.cli.view import actor_of
+    from facert.pages.pose_page import PosePage
+
+    if files.rig is None:
+        raise typer.BadParameter("--view draws the character: give its rig with --rig")
+    rig = read_rig_file(files.rig, files.shapes)
+    take = None if files.take is None else read_take_file(files.take, files.target)
+    session = _session(files, rig, take, overwrite)
+    actor = None if take is None else actor_of(take, files.actor, files.shapes)
+    title = files.rig.name if files.take is None else files.take.name
+    with page_server(title, host, port) as server:
+        with reading(files.rig):
+            page = PosePage(server, rig, session, actor)
+        console.out.print(f"{address(server)} (Ctrl-C ends it)", markup=False)
+        wait_for_interrupt()
+        page.stop()
+    if session.saved:
+        console.out.print(f"{session.output}: {session.saved} poses saved", markup=False)
+
+
+def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> Session:
+    """The recording with its model, and where its labels go."""
+    from facert.pages.session import Session, character_controls, output_beside
+
+    output = files.output
+    if output is None and files.take is not None:
+        output = output_beside(files.take)
+    model = _model(files)
+    if output is not None:
+        _require_output(output, overwrite)
+    with reading(files.take or files.rig or ""):
+        return Session(character_controls(model, take, rig), take, model, output)
+
+
+def _require_output(output: Path, overwrite: bool) -> None:
+    """Refuse names that could not be written to once an hour of posing is done."""
+    from facert.io.formats import HDF5_ENDINGS
+
+    if output.suffix.lower() not in HDF5_ENDINGS:
+        expected, found = f"a name that ends in {HDF5_ENDINGS[0]}", repr(output.suffix)
+        raise InputError("output", expected, found, "Give another name.", where=str(output))
+    for path in (output, output.with_suffix(".safetensors")):
+        if path.exists() and not overwrite:
+            console.log.info("to go on from its poses: --take %s --overwrite", output)
+            raise OutputExistsError(path)
+
+
+def _model(files: Files) -> Retargeter | None:
+    """The model that was named; one that lies about may be of another character."""
+    import facert
+
+    if files.model is None and DEFAULT_MODEL.exists():
+        console.log.info("to go on with %s: --model %s", DEFAULT_MODEL, DEFAULT_MODEL)
+    return None if files.model is None else facert.load(files.model)

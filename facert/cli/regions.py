@@ -1,0 +1,33 @@
+"""``facert regions``: parts of a face that can be learned apart, as TOML to edit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facert.errors import reading
+
+
+def command(
+    take: Annotated[Path, typer.Argument(help="Take with poses in some frames.")],
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz take that has several.")
+    ] = None,
+) -> None:
+    """Find regions of markers and controls: facert regions take.h5 > regions.toml.
+
+    What it prints is what `facert train --regions auto` learns apart; edit it, and give it to
+    `facert train --regions regions.toml`. A control may be in several regions.
+    """
+    from facert.io.formats import read_take_file
+    from facert.io.regions import regions_text
+    from facert.preparation import prepare
+    from facert.regions.automatic import find_regions
+    from facert.settings import Settings
+
+    found = read_take_file(take, target=target)
+    with reading(take):
+        regions = find_regions(prepare(found, Settings()).take)
+    typer.echo(regions_text(regions), nl=False)

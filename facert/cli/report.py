@@ -1,0 +1,63 @@
+"""``facert report``: results as one page that opens anywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facert.cli import console
+from facert.errors import InputError, OutputExistsError
+
+ENDINGS = (".html", ".htm")
+
+
+def command(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RESULT...", help="What eval --json or retarget wrote, or a folder of these."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The page.", metavar="PAGE.html")
+    ] = Path("report.html"),
+    rig_path: Annotated[
+        Path | None, typer.Option("--rig", help="The character's rig, to draw faces.")
+    ] = None,
+    truth_path: Annotated[
+        Path | None, typer.Option("--truth", help="The true poses of the same frames.")
+    ] = None,
+    title: Annotated[str, typer.Option(help="Stands above all.")] = "",
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which target of an .npz truth that has several.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page.")] = False,
+) -> None:
+    """Write one HTML file with tables, figures and faces, that opens without a network."""
+    if output.suffix.lower() not in ENDINGS:
+        expected, found = f"a name that ends in {ENDINGS[0]}", repr(output.suffix)
+        raise InputError("output", expected, found, "Give another name.", where=str(output))
+    if output.exists() and not overwrite:
+        raise OutputExistsError(output)
+
+    from facert.io.formats import read_rig_file, read_take_file
+    from facert.report.folder import file_section, folder_sections
+    from facert.report.page import make_report, write_report
+    from facert.report.sections import Section
+
+    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
+    truth = read_take_file(truth_path, target) if truth_path is not None else None
+    sections: list[Section] = []
+    for path in results:
+        if path.is_dir():
+            sections.extend(folder_sections(path, rig, truth))
+        else:
+            sections.append(file_section(path, rig, truth))
+    name = title or ", ".join(path.resolve().name for path in results)
+    write_report(make_report(name, tuple(sections)), output, overwrite)
+    console.out.print(f"{output}: {len(sections)} sections", markup=False)

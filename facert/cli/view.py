@@ -1,0 +1,93 @@
+"""``facert view``: a performance in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli import console
+from facert.errors import InputError, reading
+
+if TYPE_CHECKING:
+    from facert.data import Rig, Take
+    from facert.pages.performance import Performance
+    from facert.view.faces import Face
+
+
+def command(
+    path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take, or what retarget wrote.")],
+    rig_path: Annotated[Path | None, typer.Option("--rig", help="The character's rig.")] = None,
+    truth_path: Annotated[
+        Path | None, typer.Option("--truth", help="The true poses of the same frames.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", "-m", help="Retarget TAKE with this model first.")
+    ] = None,
+    actor_path: Annotated[
+        Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Which of several targets of .npz takes.")
+    ] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 for other machines as well.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port, or the next free one.")] = 8080,
+) -> None:
+    """Show a performance in the browser: source, character and truth, with errors and curves.
+
+    Ctrl-C ends it.
+    """
+    from facert.io.formats import read_rig_file, read_take_file
+    from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
+
+    require_viser()
+    from facert.pages.view_page import ViewPage
+
+    take = read_take_file(path, target)
+    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
+    truth = read_take_file(truth_path, target) if truth_path is not None else None
+    with reading(path):
+        performance = _performance(take, rig, truth, model)
+        actor = actor_of(take, actor_path, shapes)
+    with page_server(path.name, host, port) as server:
+        page = ViewPage(server, performance, actor)
+        console.out.print(f"{address(server)} (Ctrl-C ends it)", markup=False)
+        wait_for_interrupt()
+        page.worker.stop()
+
+
+def _performance(
+    take: Take, rig: Rig | None, truth: Take | None, model: Path | None
+) -> Performance:
+    """The take as it is, or retargeted."""
+    import facert
+    from facert.pages.performance import Performance, retargeted
+
+    if model is not None:
+        return retargeted(take, facert.load(model), rig, truth)
+    posed_here = take.labels if len(take.labels) < len(take) else take.labels[:0]
+    return Performance(take, posed_here, rig, truth)
+
+
+def actor_of(take: Take, path: Path | None, shapes: str | None) -> Face | None:
+    """The face of an actor whose weights were tracked, if his rig is there.
+
+    Raises
+    ------
+    InputError
+        When the take holds markers, or the rig has a shape for none of the weights.
+    """
+    from facert.io.formats import read_rig_file
+    from facert.view.contact import actor_face
+
+    if path is None:
+        return None
+    if take.source.kind != "weights":
+        raise InputError("--actor", "a take of weights", "markers", "Leave it out.")
+    return actor_face(take, read_rig_file(path, shapes))

@@ -1,0 +1,68 @@
+"""Face Cap recordings (TXT): tracked weights of an iPhone.
+
+Lines of cells between commas, each with a word in front: ``info`` tells of the program, ``bs``
+names the shapes, ``k`` is a frame: milliseconds, the head's position and rotation (3 + 3), the
+rotations of the eyes (2 + 2), then a weight a shape.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+
+from facert.data import Source, Take
+from facert.errors import InputError, reading
+from facert.io.rate import nominal_rate
+from facert.io.text import Row, check_width, read_text, to_numbers
+from facert.names import canonical
+
+log = logging.getLogger("facert")
+
+_CLOCK = 1  # of a frame's cells
+_SHAPES = 12  # from here on
+
+
+def read_facecap(path: Path) -> Take:
+    """Read a Face Cap recording as a take whose source is weights, in ARKit's spelling.
+
+    Time counts from the first frame. The motion of head and eyes is left out: it has no shapes.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line that is at fault.
+    """
+    with reading(path):
+        lines = [
+            Row(number, [cell.strip() for cell in line.split(",")])
+            for number, line in enumerate(read_text(path).splitlines(), start=1)
+        ]
+        names = _shape_names(lines)
+        rows = _without_trailing_comma([row for row in lines if row.cells[0] == "k"])
+        if not rows:
+            raise InputError("file", "lines of frames (k,...)", "none", "Export it again.")
+        header = ["k", "milliseconds", *(f"pose {i}" for i in range(1, 11)), *names]
+        check_width(rows, header)
+        columns = [_CLOCK, *range(_SHAPES, len(header))]
+        values = to_numbers(rows, header, columns)
+        time = (values[:, 0] - values[0, 0]) / 1000.0
+        log.info("the motion of head and eyes is left out")
+        return Take(
+            time=time,
+            source=Source(values[:, 1:], tuple(map(canonical, names))),
+            fps=nominal_rate(time),
+        )
+
+
+def _shape_names(lines: Sequence[Row]) -> list[str]:
+    named = [row.cells[1:] for row in lines if row.cells[0] == "bs"]
+    if len(named) != 1:
+        raise InputError(
+            "line bs", "one line with the shapes' names", f"{len(named)}", "Give a Face Cap TXT."
+        )
+    return named[0] if named[0] and named[0][-1] else named[0][:-1]
+
+
+def _without_trailing_comma(rows: Sequence[Row]) -> list[Row]:
+    return [Row(row.line, row.cells[:-1] if not row.cells[-1] else row.cells) for row in rows]

@@ -1,0 +1,180 @@
+"""The guarded door for glTF 2.0: documents (``.gltf``) and binary files (``.glb``).
+
+JSON tells of arrays of numbers (accessors), where they lie in buffers (views), what they mean. All
+of it is foreign: offsets, counts and strides are compared with the bytes there are before an array
+is made. A buffer is in the file itself or in a file beside the document, never elsewhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facert.data import FloatArray, IntArray
+from facert.errors import InputError, reading
+from facert.io.curves import parse_json_object
+from facert.io.text import MAX_BYTES, existing_file
+
+MAX_VALUES = 2**27
+"""Most numbers of one array: 1 GiB of float64."""
+
+_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+_EMBEDDED = ";base64,"
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a glTF file says, and its buffers.
+
+    Attributes
+    ----------
+    root : dict
+        The JSON, as it stands in the file: keys and types are not checked.
+    buffers : sequence of bytes
+    """
+
+    root: dict[str, Any]
+    buffers: Sequence[bytes]
+
+    def numbers(self, accessor: int) -> FloatArray:
+        """An accessor's numbers (count, width) as float64; normalised integers are 0 to 1."""
+        told = self.root["accessors"][_index(accessor)]
+        values = self._values(told)
+        if not told.get("normalized", False):
+            return values.astype(np.float64)
+        return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
+
+    def integers(self, accessor: int) -> IntArray:
+        """An accessor's whole numbers, (count,)."""
+        values = self._values(self.root["accessors"][_index(accessor)])
+        if values.dtype.kind != "u":
+            raise ValueError("indices that are no unsigned integers")
+        return values[:, 0].astype(np.int64)
+
+    def _values(self, told: dict[str, Any]) -> NDArray[Any]:
+        width, count = _WIDTHS[told["type"]], _index(told["count"])
+        if count * width > MAX_VALUES:
+            raise InputError("accessors", f"at most {MAX_VALUES} numbers", f"{count}", "Cut it.")
+        dtype = _TYPES[told["componentType"]]
+        values = np.zeros((count, width), dtype)
+        if "bufferView" in told:
+            values = self._view(told, dtype, count, width)
+        if "sparse" in told:
+            sparse = told["sparse"]
+            changed = _index(sparse["count"])
+            places = sparse["indices"]
+            rows = self._view(places, _TYPES[places["componentType"]], changed, 1)[:, 0]
+            values = values.copy()
+            values[rows] = self._view(sparse["values"], dtype, changed, width)
+        return values
+
+    def _view(self, told: dict[str, Any], dtype: str, count: int, width: int) -> NDArray[Any]:
+        """Numbers that lie in a buffer, (count, width)."""
+        view = self.root["bufferViews"][_index(told["bufferView"])]
+        begin, offset = _index(view.get("byteOffset", 0)), _index(told.get("byteOffset", 0))
+        content = self.buffers[_index(view["buffer"])][begin : begin + _index(view["byteLength"])]
+        size = np.dtype(dtype).itemsize
+        stride = _index(view.get("byteStride", 0)) or width * size
+        # Not left to NumPy, which takes an empty buffer to be as large as it needs to be.
+        if count and offset + (count - 1) * stride + width * size > len(content):
+            raise ValueError(f"{count} numbers in {len(content)} bytes")
+        return np.ndarray((count, width), dtype, content, offset, (stride, size))
+
+
+@contextmanager
+def open_gltf(path: Path) -> Iterator[Document]:
+    """Read a foreign glTF file; whatever goes wrong inside the block is blamed on it.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, too large, cut short, compressed, or no glTF 2.0.
+    """
+    path = Path(path)
+    with reading(path):
+        try:
+            yield _document(path)
+        except InputError:
+            raise
+        # A document of wrong types and numbers raises KeyError, TypeError and many more.
+        except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            found = f"damaged or inconsistent data ({error})"
+            raise InputError("file", "valid glTF 2.0", found, "Export it again.") from error
+
+
+def _document(path: Path) -> Document:
+    content = _content(path)
+    binary = content[:4] == struct.pack("<I", _MAGIC)
+    text, own = _chunks(content) if binary else (content, None)
+    root = parse_json_object(text)
+    if not str(root["asset"]["version"]).startswith("2"):
+        raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
+    packed = sorted(set(_PACKED) & set(root.get("extensionsRequired", [])))
+    if packed:
+        raise InputError(
+            "extensionsRequired", "plain geometry", packed[0], "Export it without compression."
+        )
+    told = root.get("buffers", [])
+    return Document(root, [_buffer(one, path.parent, own, i) for i, one in enumerate(told)])
+
+
+def _content(path: Path) -> bytes:
+    size = existing_file(path).stat().st_size
+    if size > MAX_BYTES:
+        raise InputError("file", f"at most {MAX_BYTES} bytes", f"{size}", "Cut it into parts.")
+    return path.read_bytes()
+
+
+def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
+    """The JSON and the binary chunk of a GLB file."""
+    try:
+        _, version, total, length, kind = struct.unpack_from("<IIIII", content)
+        rest = content[20 + length : total]
+        if version != 2 or kind != _JSON or total > len(content) or 20 + length > total:
+            raise ValueError
+        size, other = struct.unpack_from("<II", rest) if len(rest) >= 8 else (0, 0)
+    except (struct.error, ValueError):
+        raise InputError(
+            "file",
+            "a whole GLB file of version 2",
+            "another or a truncated one",
+            "Export it again.",
+        ) from None
+    return content[20 : 20 + length], rest[8 : 8 + size] if other == _BINARY else None
+
+
+def _buffer(told: dict[str, Any], folder: Path, own: bytes | None, number: int) -> bytes:
+    uri = told.get("uri")
+    if uri is None and number == 0 and own is not None:
+        return own
+    if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:
+        try:
+            return base64.b64decode(uri.partition(_EMBEDDED)[2], validate=True)
+        except binascii.Error as error:
+            raise ValueError(f"a buffer: {error}") from error
+    name = unquote(uri) if isinstance(uri, str) else ""
+    if not name or name != Path(name).name or "\\" in name or ":" in name or name == "..":
+        raise InputError(
+            "buffers", "data in the file or beside it", f"{uri!r}", "Export it as one .glb file."
+        )
+    return _content(folder / name)
+
+
+def _index(value: Any) -> int:
+    """A number that counts or points: a whole one, not below 0."""
+    if type(value) is not int or value < 0:
+        raise ValueError(f"{value!r} where a whole number from 0 on is due")
+    return value

@@ -1,0 +1,134 @@
+"""Takes in glTF files: the animation of morph targets' weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from facert.data import FloatArray, Source, Take
+from facert.errors import InputError
+from facert.io.gltf import MAX_VALUES, Document, open_gltf
+from facert.io.gltf_rig import target_names
+from facert.io.rate import nominal_rate
+
+_FASTEST = 240.0  # frames a second
+_CLOSE = 0.05  # the share of the steps between keys that are as close as frames, at least
+_SAME = 1e-6  # seconds: keys are stored as float32
+
+
+@dataclass(frozen=True, eq=False)
+class _Curves:
+    """The keys of the weights of one mesh."""
+
+    time: FloatArray  # (n,)
+    values: FloatArray  # (n, K), or (n, 3, K) with tangents in, values, tangents out
+    names: tuple[str, ...]
+    interpolation: str
+
+
+def read_gltf_take(path: Path, animation: str | None = None) -> Take:
+    """Read the animation of morph targets as a take whose source is weights.
+
+    Every key is a frame; between keys that lie farther apart than frames, there are others, which
+    are sampled as the file says that keys are interpolated.
+
+    Parameters
+    ----------
+    path : Path
+    animation : str, optional
+        Which of several animations.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read safely, or holds no animation of weights, or several.
+    """
+    with open_gltf(path) as document:
+        curves = _chosen(document, animation)
+        time, rate = _frame_times([one.time for one in curves])
+        names = tuple(dict.fromkeys(name for one in curves for name in one.names))
+        if len(time) * len(names) > MAX_VALUES:
+            raise ValueError("more frames than can be kept")
+        values = np.full((len(time), len(names)), np.nan)
+        for one in reversed(curves):  # where two meshes have a name, the first one's counts
+            values[:, [names.index(name) for name in one.names]] = _sampled(one, time)
+        return Take(time=time, source=Source(values, names), fps=rate)
+
+
+def holds_animation(path: Path) -> bool:
+    """Whether a glTF file animates the weights of morph targets."""
+    with open_gltf(path) as document:
+        return any(_channels(one) for one in document.root.get("animations", []))
+
+
+def _channels(animation: dict[str, Any]) -> list[dict[str, Any]]:
+    return [one for one in animation["channels"] if one["target"]["path"] == "weights"]
+
+
+def _chosen(document: Document, asked: str | None) -> list[_Curves]:
+    """The curves of the animation that was asked for, or of the only one."""
+    found = [one for one in document.root.get("animations", []) if _channels(one)]
+    names = [str(one.get("name", f"animation {i}")) for i, one in enumerate(found, start=1)]
+    there = f"one of: {', '.join(names)}" if names else "an animation of morph targets"
+    if asked is not None and asked not in names:
+        raise InputError("--target", there, repr(asked), "Choose with --target.")
+    if asked is None and len(found) != 1:
+        wanted = "Choose with --target." if found else "Export the animation as well."
+        raise InputError("animations", there, "none" if not found else "no choice", wanted)
+    animation = found[names.index(asked)] if asked is not None else found[0]
+    return [_curves(document, animation, channel) for channel in _channels(animation)]
+
+
+def _curves(document: Document, animation: dict[str, Any], channel: dict[str, Any]) -> _Curves:
+    sampler = animation["samplers"][channel["sampler"]]
+    mesh = document.root["meshes"][document.root["nodes"][channel["target"]["node"]]["mesh"]]
+    count = len(mesh["primitives"][0]["targets"])
+    time = document.numbers(sampler["input"])[:, 0]
+    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise ValueError("keys whose time does not rise")
+    interpolation = sampler.get("interpolation", "LINEAR")
+    values = document.numbers(sampler["output"])
+    shape = (len(time), 3, count) if interpolation == "CUBICSPLINE" else (len(time), count)
+    return _Curves(time, values.reshape(shape), target_names(mesh, count), interpolation)
+
+
+def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:
+    """When there are frames, and their rate: at every key, and evenly between keys far apart."""
+    time = np.unique(np.concatenate(keys))
+    if len(time) < 2:
+        return time, nominal_rate(time)
+    steps = np.diff(time)
+    usual = float(np.quantile(steps, _CLOSE, method="lower"))
+    rate = min(nominal_rate(np.array([0.0, usual])), _FASTEST)
+    frames = np.maximum(np.rint(steps * rate), 1)  # in each step
+    if frames.sum() > MAX_VALUES:
+        raise ValueError("keys that lie years apart")
+    step = np.repeat(np.arange(len(steps)), frames.astype(np.int64))
+    number = np.arange(len(step)) - np.repeat(np.cumsum(frames) - frames, frames.astype(np.int64))
+    between = time[step] + steps[step] * number / frames[step]
+    return np.append(between, time[-1]), rate
+
+
+def _sampled(curves: _Curves, time: FloatArray) -> FloatArray:
+    """The weights at some times, (T, K); before the first key and after the last they stay."""
+    keys, values = curves.time, curves.values
+    if len(keys) == 1:
+        only = values[0, 1] if values.ndim == 3 else values[0]
+        return np.tile(only, (len(time), 1))
+    before = np.clip(np.searchsorted(keys, time + _SAME, side="right") - 1, 0, len(keys) - 2)
+    step = (keys[before + 1] - keys[before])[:, None]
+    t = np.clip((time - keys[before])[:, None] / step, 0.0, 1.0)
+    t[np.abs(time - keys[before + 1]) <= _SAME] = 1.0
+    if curves.interpolation == "STEP":
+        return np.where(t < 1.0, values[before], values[before + 1])
+    if curves.interpolation == "CUBICSPLINE":
+        return np.asarray(
+            (2 * t**3 - 3 * t**2 + 1) * values[before, 1]
+            + step * (t**3 - 2 * t**2 + t) * values[before, 2]
+            + (3 * t**2 - 2 * t**3) * values[before + 1, 1]
+            + step * (t**3 - t**2) * values[before + 1, 0]
+        )
+    return np.asarray((1 - t) * values[before] + t * values[before + 1])

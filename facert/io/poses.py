@@ -1,0 +1,59 @@
+"""Poses in a file of any kind: a take's poses, or a table that names the frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from facert.errors import InputError, reading
+from facert.io.formats import read_take_file
+from facert.io.text import check_width, read_csv, read_header, to_numbers
+from facert.labelling import Poses, poses_of
+
+MAX_FRAMES = 2**31
+
+_FRAME = "frame"
+
+
+def read_poses(path: Path, fps: float | None = None) -> Poses:
+    """Read poses: of a CSV with a column ``frame``, its rows; else of a take, by their times.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, a row names no frame, or there are no poses in it.
+    """
+    path = Path(path)
+    with reading(path):
+        if path.suffix.lower() == ".csv" and _names_frames(read_header(path)):
+            return replace(_read_numbered(path), where=str(path))
+        return replace(poses_of(read_take_file(path, fps=fps)), where=str(path))
+
+
+def _names_frames(header: tuple[str, ...]) -> bool:
+    lower = [name.lower() for name in header]
+    return _FRAME in lower and "time" not in lower
+
+
+def _read_numbered(path: Path) -> Poses:
+    header, rows = read_csv(path)
+    check_width(rows, header)
+    place = [name.lower() for name in header].index(_FRAME)
+    columns = [column for column in range(len(header)) if column != place]
+    numbers = to_numbers(rows, header, [place])[:, 0]
+    odd = np.flatnonzero(~((numbers == np.rint(numbers)) & (np.abs(numbers) < MAX_FRAMES)))
+    if len(odd):
+        row = rows[odd[0]]
+        raise InputError(
+            f"line {row.line}, column {header[place]}",
+            "a frame's number",
+            repr(row.cells[place]),
+            "Give whole numbers, from 0.",
+        )
+    return Poses(
+        names=tuple(header[column] for column in columns),
+        values=to_numbers(rows, header, columns),
+        frames=numbers.astype(np.int64),
+    )

@@ -1,0 +1,116 @@
+"""TRC marker files (Motion Analysis, OpenSim, Vicon and others export them).
+
+Lines of cells between tabs: ``PathFileType ...``; the names and the values of ``DataRate``,
+``NumMarkers``, ``Units`` and others; ``Frame#  Time`` and the markers' names, each over three
+columns; ``X1 Y1 Z1 ...``; then one line a frame. Writers mark what was not observed by blank cells
+or by (0, 0, 0); some hold the last position, which `facert clean` finds.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import FloatArray, Source, Take
+from facert.errors import InputError, reading
+from facert.io.rate import nominal_rate
+from facert.io.text import Row, read_text, to_numbers
+
+log = logging.getLogger("facert")
+
+_FIRST_WORD = "PathFileType"
+_LEADING = 2  # Frame# and Time
+
+
+@dataclass(frozen=True)
+class _Header:
+    facts: dict[str, str]
+    names: tuple[str, ...]
+
+
+def read_trc(path: Path) -> Take:
+    """Read a TRC file as a take whose source is markers, (T, M, 3) in the file's units.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line or column that is at fault.
+    """
+    with reading(path):
+        lines = [
+            Row(number, [cell.strip() for cell in line.split("\t")])
+            for number, line in enumerate(read_text(path).splitlines(), start=1)
+        ]
+        header = _header(lines[:5])
+        rows = _frames(lines[5:], header)
+        columns = ["Frame#", "Time", *(f"{name}.{axis}" for name in header.names for axis in "xyz")]
+        values = to_numbers(rows, columns, range(1, len(columns)))
+        time, positions = values[:, 0], values[:, 1:].reshape(len(rows), -1, 3)
+        _hide_zeros(positions)
+        return Take(
+            time=time,
+            source=Source(positions, header.names),
+            fps=_rate(header, time),
+            units=header.facts.get("units", ""),
+        )
+
+
+def _header(lines: Sequence[Row]) -> _Header:
+    """What the five lines before the frames say."""
+    if len(lines) < 5 or lines[0].cells[0] != _FIRST_WORD:
+        found = repr(lines[0].cells[0][:40]) if lines else "an empty file"
+        raise InputError(
+            "line 1", f"{_FIRST_WORD} and four more lines of a header", found, "Give a TRC file."
+        )
+    facts = dict(zip(map(str.lower, lines[1].cells), lines[2].cells, strict=False))
+    cells = lines[3].cells
+    if [cell.lower() for cell in cells[:_LEADING]] != ["frame#", "time"]:
+        raise InputError(
+            "line 4", "Frame#, Time and markers", repr(cells[:3]), "Export the file again."
+        )
+    names = tuple(cell for cell in cells[_LEADING:] if cell)
+    stated = facts.get("nummarkers", str(len(names)))
+    if stated != str(len(names)):
+        raise InputError(
+            "line 4", f"{stated} markers as NumMarkers says", f"{len(names)}", "Export it again."
+        )
+    return _Header(facts, names)
+
+
+def _frames(lines: Sequence[Row], header: _Header) -> list[Row]:
+    """The lines that are not blank, each with a cell a column: trailing blanks may be left out."""
+    width = _LEADING + 3 * len(header.names)
+    rows = [Row(row.line, _filled(row, width)) for row in lines if any(row.cells)]
+    if not rows:
+        raise InputError("file", "frames after the header", "none", "Export the file again.")
+    return rows
+
+
+def _filled(row: Row, width: int) -> list[str]:
+    if len(row.cells) < _LEADING or any(row.cells[width:]):
+        raise InputError(
+            f"line {row.line}",
+            f"{width} cells for the markers of the header",
+            f"{len(row.cells)}",
+            "Mend or remove the line.",
+        )
+    return (row.cells + [""] * width)[:width]
+
+
+def _hide_zeros(positions: FloatArray) -> None:
+    """Set to NaN what lies exactly at the origin."""
+    lost = (positions == 0).all(axis=2)
+    if lost.any():
+        log.info("%d positions at (0, 0, 0) count as not observed", lost.sum())
+    positions[lost] = np.nan
+
+
+def _rate(header: _Header, time: FloatArray) -> float:
+    try:
+        return float(header.facts["datarate"])
+    except (KeyError, ValueError):
+        return nominal_rate(time)

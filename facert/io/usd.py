@@ -1,0 +1,171 @@
+"""USD: a mesh with blend shapes and the animation of their weights, as UsdSkel has them.
+
+``.usdc`` is binary, ``.usda`` text, ``.usd`` either. The package usd-core writes them; it is not
+among what facert needs, so it may have to be installed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import facert
+from facert.errors import FacertError, InputError
+from facert.io.atomic import replacing
+from facert.morphs import Morphs
+from facert.units import METRES
+
+ENDINGS = (".usd", ".usda", ".usdc")
+
+_ROOT = "/face"
+_JOINT = "root"
+
+
+def write_usd(
+    morphs: Morphs, path: Path, fps: float, up_axis: str = "", overwrite: bool = False
+) -> None:
+    """Write a mesh with blend shapes and the animation of their weights.
+
+    Times are counted in frames from 0; a vertex that a shape does not move has no offset.
+
+    Parameters
+    ----------
+    morphs : Morphs
+    path : Path
+        Its ending is one of `ENDINGS`.
+    fps : float
+        Frames a second.
+    up_axis : str
+        ``"y"`` or ``"z"``; USD's own default, y, when it is not known.
+    overwrite : bool
+        Allow to replace an existing file.
+
+    Raises
+    ------
+    FacertError
+        When usd-core is not installed.
+    InputError
+        When the mesh has no triangles.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    Usd, UsdGeom, UsdSkel = _pxr()
+    if not len(morphs.neutral.faces):
+        raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))
+    with replacing(path, overwrite) as temporary:
+        stage = Usd.Stage.CreateNew(str(temporary))
+        UsdGeom.SetStageUpAxis(stage, "Z" if up_axis.lower() == "z" else "Y")
+        UsdGeom.SetStageMetersPerUnit(stage, METRES.get(morphs.neutral.units, 1.0))
+        _set_clock(stage, morphs, fps)
+        root = UsdSkel.Root.Define(stage, _ROOT)
+        stage.SetDefaultPrim(root.GetPrim())
+        tokens = _identifiers(morphs.names)
+        mesh = _mesh(stage, morphs)
+        _bind(stage, mesh, _animation(stage, morphs, tokens, fps), len(morphs.neutral.vertices))
+        _blend_shapes(stage, mesh, morphs, tokens)
+        stage.GetRootLayer().comment = f"facert {facert.__version__}"
+        stage.GetRootLayer().Save()
+
+
+def _pxr() -> tuple[Any, Any, Any]:
+    try:
+        from pxr import Usd, UsdGeom, UsdSkel
+    except ImportError as error:
+        raise FacertError("USD needs the package usd-core: pip install 'facert[usd]'") from error
+    return Usd, UsdGeom, UsdSkel
+
+
+def _set_clock(stage: Any, morphs: Morphs, fps: float) -> None:
+    stage.SetTimeCodesPerSecond(fps)
+    stage.SetFramesPerSecond(fps)
+    stage.SetStartTimeCode(0.0)
+    stage.SetEndTimeCode(float(morphs.time[-1] - morphs.time[0]) * fps)
+
+
+def _mesh(stage: Any, morphs: Morphs) -> Any:
+    from pxr import UsdGeom, Vt
+
+    neutral = morphs.neutral
+    mesh = UsdGeom.Mesh.Define(stage, f"{_ROOT}/mesh")
+    mesh.CreatePointsAttr(_vectors(neutral.vertices))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(_int32(neutral.faces.ravel())))
+    counts = np.full(len(neutral.faces), 3)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(_int32(counts)))
+    mesh.CreateSubdivisionSchemeAttr("none")
+    bounds = np.stack([neutral.vertices.min(axis=0), neutral.vertices.max(axis=0)])
+    mesh.CreateExtentAttr(_vectors(bounds))
+    if neutral.colours is not None:
+        colours = mesh.CreateDisplayColorPrimvar("vertex")
+        colours.Set(_vectors(neutral.colours**2.2))  # USD's are linear light
+    return mesh
+
+
+def _animation(stage: Any, morphs: Morphs, tokens: list[str], fps: float) -> Any:
+    """The weights of the shapes in every frame."""
+    from pxr import UsdSkel, Vt
+
+    animation = UsdSkel.Animation.Define(stage, f"{_ROOT}/animation")
+    animation.CreateBlendShapesAttr(tokens)
+    weights = animation.CreateBlendShapeWeightsAttr()
+    frames = (morphs.time - morphs.time[0]) * fps
+    for frame, row in zip(frames.tolist(), morphs.weights.astype(np.float32), strict=True):
+        weights.Set(Vt.FloatArray.FromNumpy(row), frame)
+    return animation
+
+
+def _bind(stage: Any, mesh: Any, animation: Any, vertices: int) -> None:
+    """A skeleton of one joint at rest: programs look for blend shapes below a skeleton."""
+    from pxr import Gf, UsdSkel, Vt
+
+    skeleton = UsdSkel.Skeleton.Define(stage, f"{_ROOT}/skeleton")
+    skeleton.CreateJointsAttr([_JOINT])
+    skeleton.CreateBindTransformsAttr([Gf.Matrix4d(1.0)])
+    skeleton.CreateRestTransformsAttr([Gf.Matrix4d(1.0)])
+    holder = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+    holder.CreateAnimationSourceRel().SetTargets([animation.GetPath()])
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray([0] * vertices))
+    binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray([1.0] * vertices))
+
+
+def _blend_shapes(stage: Any, mesh: Any, morphs: Morphs, tokens: list[str]) -> None:
+    from pxr import UsdSkel, Vt
+
+    paths = []
+    for token, name, target in zip(tokens, morphs.names, morphs.targets, strict=True):
+        shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(token))
+        moved = np.flatnonzero((target != 0).any(axis=1))
+        moved = moved if len(moved) else np.arange(1)  # programs drop a shape without offsets
+        shape.CreateOffsetsAttr(_vectors(target[moved]))
+        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(_int32(moved)))
+        shape.GetPrim().SetDisplayName(name)
+        paths.append(shape.GetPath())
+    binding = UsdSkel.BindingAPI(mesh.GetPrim())
+    binding.CreateBlendShapesAttr(tokens)
+    binding.CreateBlendShapeTargetsRel().SetTargets(paths)
+
+
+def _identifiers(names: tuple[str, ...]) -> list[str]:
+    """Names that USD allows in a path, all different; most names are such already."""
+    from pxr import Tf
+
+    found: list[str] = []
+    for name in names:
+        base = identifier = Tf.MakeValidIdentifier(name)
+        while identifier in found:
+            identifier = f"{base}_{len(found)}"
+        found.append(identifier)
+    return found
+
+
+def _vectors(values: Any) -> Any:
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, dtype=np.float32))
+
+
+def _int32(values: Any) -> Any:
+    return np.ascontiguousarray(values, dtype=np.int32)

@@ -1,0 +1,187 @@
+"""Poses from elsewhere, given to the frames of a take."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from facert.arrays import checked_names
+from facert.data import Controls, FloatArray, IntArray, Rig, Take
+from facert.errors import InputError, reading
+from facert.names import match, shape_drivers
+from facert.resampling import nearest_frames
+
+log = logging.getLogger("facert")
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of a character, each for a frame of a take that is to be told.
+
+    Parameters
+    ----------
+    names : sequence of str, length P
+        The controls.
+    values : array, shape (n, P)
+        A row of NaN is no pose.
+    time : array, shape (n,), optional
+        Seconds in the take's time; or
+    frames : array of int, shape (n,), optional
+        the numbers of the frames, from 0.
+    limits : array, shape (P, 2), optional
+    where : str
+        The file or argument that they are from, for messages.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    time: FloatArray | None = None
+    frames: IntArray | None = None
+    limits: FloatArray | None = None
+    where: str = "poses"
+
+
+def labelled(take: Take, poses: Poses) -> Take:
+    """The take with these poses as labels, beside those that it has.
+
+    By time, a pose belongs to the nearest frame, half a nominal frame away at most. Where the take
+    has a pose already, the new one counts; deviations of predicted poses are dropped.
+
+    Parameters
+    ----------
+    take : Take
+    poses : Poses
+
+    Raises
+    ------
+    InputError
+        For a pose without a frame, two for one frame, no pose at all, or a take whose controls
+        are others.
+    """
+    with reading(poses.where):
+        poses = _known(poses)
+        frames = _by_number(take, poses) if poses.time is None else _by_time(take, poses)
+        _require_different(frames)
+        controls, order = _common_controls(take, poses)
+        params = np.full((len(take), len(order)), np.nan)
+        if take.params is not None and len(take.labels):
+            params[:] = take.params
+        params[frames] = poses.values[:, order]
+        return replace(take, controls=controls, params=params, std=None)
+
+
+def _known(poses: Poses) -> Poses:
+    """The rows that are poses, whose names are checked."""
+    names = checked_names(poses.names, poses.values.shape[1], "names of the controls")
+    known = np.asarray(~np.isnan(poses.values).all(axis=1))
+    if not known.any():
+        raise InputError("rows", "a pose at least", "none", "Write a row for each posed frame.")
+    return replace(
+        poses,
+        names=names,
+        values=poses.values[known],
+        time=None if poses.time is None else poses.time[known],
+        frames=None if poses.frames is None else poses.frames[known],
+    )
+
+
+def _by_number(take: Take, poses: Poses) -> IntArray:
+    assert poses.frames is not None  # poses without a time have frames
+    outside = poses.frames[(poses.frames < 0) | (poses.frames >= len(take))]
+    if len(outside):
+        last = len(take) - 1
+        raise InputError("column frame", f"0 to {last}", f"{outside[0]}", "Count from 0.")
+    return poses.frames
+
+
+def _by_time(take: Take, poses: Poses) -> IntArray:
+    """The nearest frame of each pose."""
+    assert poses.time is not None
+    frames = nearest_frames(take.time, poses.time)
+    distance = np.abs(take.time[frames] - poses.time)
+    astray = np.flatnonzero(~(distance <= 0.5 / take.fps + 1e-6))
+    if len(astray):
+        far, row = poses.time[astray[0]], frames[astray[0]]
+        raise InputError(
+            "time of the poses",
+            f"within half a frame of one of the take, such as {take.time[row]:.3f} s",
+            f"{far:.3f} s",
+            "Count seconds as the take does, or give a column frame.",
+        )
+    return frames
+
+
+def _require_different(frames: IntArray) -> None:
+    found, counts = np.unique(frames, return_counts=True)
+    if (counts > 1).any():
+        twice = found[counts > 1][0]
+        raise InputError("rows", "one pose a frame", f"two for {twice}", "Remove one of them.")
+
+
+def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:
+    """The controls of both, and where each of them stands among the columns of the poses."""
+    if take.controls is None or (not len(take.labels) and take.animation is None):
+        return Controls(poses.names, poses.limits), np.arange(len(poses.names))
+    order = match(take.controls.names, poses.names, "names of the poses")
+    if len(order) != len(poses.names):
+        raise InputError(
+            "names of the poses",
+            f"the take's {len(take.controls.names)} controls",
+            f"{len(poses.names)}",
+            "Pose the same controls.",
+        )
+    return take.controls, order
+
+
+def poses_of(take: Take) -> Poses:
+    """The poses of another take by their times; of one without poses, its weights.
+
+    Raises
+    ------
+    InputError
+        When it has markers only.
+    """
+    if take.controls is not None and take.params is not None:
+        return Poses(take.controls.names, take.params, take.time, limits=take.controls.limits)
+    if take.source.kind == "weights":
+        return Poses(take.source.names, take.source.values, take.time)
+    raise InputError("/target/params", "poses", "markers only", "Give the file with the poses.")
+
+
+def weights_as_poses(take: Take, rig: Rig) -> Take:
+    """The take with its tracked weights as the poses of a rig that has shapes of their names.
+
+    Weights without a shape are left out, and the log names them. A frame with a weight that was
+    not observed has no pose.
+
+    Raises
+    ------
+    InputError
+        When the source is markers, no weight has a shape, or no frame is observed as a whole.
+    """
+    poses = poses_of(take)
+    kept = [i for i, name in enumerate(poses.names) if _has_shape(name, rig)]
+    if not kept:
+        found = f"{poses.names[0]!r} and others"
+        raise InputError("/source/names", "names of the rig's shapes", found, "Give another rig.")
+    left_out = [name for i, name in enumerate(poses.names) if i not in set(kept)]
+    if left_out:
+        log.warning("%d weights move nothing: %s", len(left_out), ", ".join(left_out))
+    values = poses.values[:, kept]
+    whole = np.asarray(~np.isnan(values).any(axis=1))
+    if not whole.any():
+        found = "gaps in every frame"
+        raise InputError("/source/weights", "a whole frame", found, "Fill them: facert clean.")
+    controls = Controls(tuple(poses.names[i] for i in kept))
+    params = np.where(whole[:, None], values, np.nan)
+    return replace(take, controls=controls, params=params, std=None, animation=None)
+
+
+def _has_shape(name: str, rig: Rig) -> bool:
+    try:
+        shape_drivers([name], rig.names)
+    except InputError:
+        return False
+    return True

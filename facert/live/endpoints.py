@@ -1,0 +1,168 @@
+"""What ``--in`` and ``--out`` name: ``livelink:11111``, ``vmc:127.0.0.1:39539``, ``csv:a.csv``."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from facert.data import Take
+from facert.errors import InputError
+from facert.live.frames import Counters, Decoder, Encoder
+from facert.live.ifacialmocap import IFacialMocapDecoder
+from facert.live.livelink import LiveLinkDecoder, LiveLinkEncoder
+from facert.live.receivers import UdpReceiver
+from facert.live.senders import SocketAddress, UdpSender
+from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
+
+LOOPBACK = "127.0.0.1"
+IN_PORTS = {"livelink": 11111, "vmc": 39540, "osc": 9000, "ifacialmocap": 49983}
+OUT_PORTS = {"livelink": 11111, "vmc": 39539, "osc": 9000}
+IN_FILES: Mapping[str, tuple[str, ...]] = {"take": ()}
+OUT_FILES: Mapping[str, tuple[str, ...]] = {"csv": (".csv",), "h5": (".h5", ".hdf5")}
+
+_ENCODERS: Mapping[str, Callable[[Sequence[str]], Encoder]] = {
+    "livelink": LiveLinkEncoder,
+    "vmc": VmcEncoder,
+    "osc": OscEncoder,
+}
+
+
+@dataclass(frozen=True)
+class Address:
+    """A protocol with a place on the network; without a host, this machine."""
+
+    kind: str
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        """As it is written on the command line."""
+        return f"{self.kind}:{self.host}:{self.port}"
+
+
+@dataclass(frozen=True)
+class File:
+    """A file that plays or records."""
+
+    kind: str
+    path: Path
+
+
+def parse_input(text: str) -> Address | File:
+    """Understand ``KIND[:PORT]`` or ``take:FILE``.
+
+    Raises
+    ------
+    ValueError
+        With what would be understood.
+    """
+    place = _parse(text, IN_PORTS, IN_FILES)
+    if isinstance(place, Address) and place.host != LOOPBACK:
+        raise ValueError(f"{text!r}: give {place.kind}:PORT, and the address with --listen")
+    return place
+
+
+def parse_output(text: str) -> Address | File:
+    """Understand ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE``.
+
+    Raises
+    ------
+    ValueError
+        With what would be understood.
+    """
+    return _parse(text, OUT_PORTS, OUT_FILES)
+
+
+def _parse(
+    text: str, ports: Mapping[str, int], files: Mapping[str, tuple[str, ...]]
+) -> Address | File:
+    kind, _, rest = text.partition(":")
+    if kind in files:
+        if not rest or (files[kind] and Path(rest).suffix.lower() not in files[kind]):
+            raise ValueError(f"{text!r}: expected {kind}:FILE{' or '.join(files[kind])}")
+        return File(kind, Path(rest))
+    if kind not in ports:
+        raise ValueError(f"{text!r}: expected one of {', '.join([*ports, *files])}, as in livelink")
+    host, _, port = rest.rpartition(":") if _ends_in_port(rest) else (rest, "", "")
+    number = int(port) if port else ports[kind]
+    if not 0 <= number < 2**16:
+        raise ValueError(f"{text!r}: there is no port {number}")
+    return Address(kind, host.strip("[]") or LOOPBACK, number)
+
+
+def _ends_in_port(rest: str) -> bool:
+    """Whether what follows the last colon is a number; that of [::1] is none."""
+    return rest.rpartition(":")[2].isdecimal() and not rest.endswith("]")
+
+
+def open_receiver(address: Address, listen: str, wanted: Take) -> UdpReceiver:
+    """Listen for frames.
+
+    Parameters
+    ----------
+    address : Address
+    listen : str
+        The machine's own address that is listened on: `LOOPBACK` for this machine alone.
+    wanted : Take
+        With the names, kind and units that the model wants.
+
+    Raises
+    ------
+    InputError
+        When the port is taken, or the protocol cannot bring what the model wants.
+    """
+    decoder = _decoder(address.kind, wanted)
+    family, where = _resolve(address, listen)
+    listening = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        listening.bind(where)
+    except OSError as error:
+        listening.close()
+        raise InputError(
+            f"{address.kind} on {listen}, port {address.port}",
+            "an address of this machine and a free port",
+            error.strerror or str(error),
+            "Close the program that listens there, or choose another port.",
+        ) from error
+    return UdpReceiver(listening, decoder)
+
+
+def open_sender(address: Address, controls: tuple[str, ...], counters: Counters) -> UdpSender:
+    """Be ready to send poses.
+
+    Raises
+    ------
+    InputError
+        When there is no such host, or the protocol cannot hold any of the controls.
+    """
+    encoder = _ENCODERS[address.kind](controls)
+    family, where = _resolve(address, address.host)
+    return UdpSender(encoder, family, where, counters)
+
+
+def _decoder(kind: str, wanted: Take) -> Decoder:
+    source = wanted.source
+    if kind in ("vmc", "osc"):
+        return OscDecoder(source.names, source.kind, wanted.units)
+    if source.kind == "markers":
+        raise InputError(
+            f"--in {kind}",
+            "markers, as the model was trained on",
+            "weights",
+            "Give --in osc or --in take, or a model of tracked weights.",
+        )
+    return LiveLinkDecoder() if kind == "livelink" else IFacialMocapDecoder()
+
+
+def _resolve(address: Address, host: str) -> tuple[socket.AddressFamily, SocketAddress]:
+    """Family and address of a host; version 4 where it has both, as most programs listen there."""
+    try:
+        found = socket.getaddrinfo(host, address.port, type=socket.SOCK_DGRAM)
+    except (OSError, UnicodeError) as error:
+        raise InputError(
+            address.kind, "a host that is known", f"{host!r}: {error}", "Check the address."
+        ) from error
+    family, _, _, _, where = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    return family, where

@@ -1,0 +1,166 @@
+"""What passes through a live session: what a packet tells, frames in order, and what is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from facert.data import FloatArray, Source, SourceKind, Take
+
+if TYPE_CHECKING:
+    from facert.streaming import Streamed
+
+
+class BadPacketError(ValueError):
+    """A datagram is not what it should be; it is counted and passed over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What one sender says of one moment.
+
+    Parameters
+    ----------
+    values : array, shape (D,) or (M, 3)
+        Weights or markers in the order of the decoder's pattern; NaN: not observed. All NaN when
+        the sender saw no face.
+    sender : str
+        Whose frame it is, where the packet tells.
+    stamp : float, optional
+        Seconds on the sender's clock.
+    identity : bytes, optional
+        What two frames only share when one is a copy of the other.
+    """
+
+    values: FloatArray
+    sender: str = ""
+    stamp: float | None = None
+    identity: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame of the session.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the session's first frame, strictly rising.
+    values : array, shape (D,) or (M, 3)
+    arrived : float
+        When it came in, by `time.perf_counter`.
+    """
+
+    time: float
+    values: FloatArray
+    arrived: float
+
+
+def frame_pattern(names: Sequence[str], kind: SourceKind = "weights", units: str = "") -> Take:
+    """One frame of zeros with these names."""
+    shape = (1, len(names), 3) if kind == "markers" else (1, len(names))
+    return Take(np.zeros(1), Source(np.zeros(shape), tuple(names)), units=units)
+
+
+@dataclass
+class Counters:
+    """What became of everything that came in.
+
+    Attributes
+    ----------
+    received : int
+        Frames with a face, in order: each is mapped, dropped, or failed.
+    mapped : int
+        Frames whose pose was sent.
+    dropped : int
+        Frames that a newer one overtook before they were mapped.
+    failed : int
+        Frames for which there is no finite pose.
+    hidden : int
+        Frames in which the sender saw no face.
+    late : int
+        Packets that came twice, after a newer one, or from a second sender.
+    bad : int
+        Packets that could not be understood.
+    unsent : int
+        Packets that the system would not send.
+    """
+
+    received: int = 0
+    mapped: int = 0
+    dropped: int = 0
+    failed: int = 0
+    hidden: int = 0
+    late: int = 0
+    bad: int = 0
+    unsent: int = 0
+
+
+class Decoder(Protocol):
+    """Understands the packets of one protocol."""
+
+    pattern: Take
+    """One frame of zeros: names, kind and units of what it returns."""
+    from_midnight: bool
+    """Whether its stamps count from midnight, as a timecode does."""
+
+    def decode(self, packet: bytes) -> Observed | None:
+        """What the packet tells; None while its frame is not complete.
+
+        Raises
+        ------
+        BadPacketError
+            When the packet is malformed; nothing else has changed then.
+        """
+        ...
+
+
+class Encoder(Protocol):
+    """Writes the packets of one protocol."""
+
+    def encode(self, params: FloatArray, time: float) -> list[bytes]:
+        """The packets of a pose (P,) at a time in seconds."""
+        ...
+
+
+class Output(Protocol):
+    """Where poses go."""
+
+    def send(self, frame: Frame, pose: Streamed) -> None:
+        """Pass on the pose of a frame, without waiting for anybody."""
+        ...
+
+    def close(self) -> None:
+        """Let go of what it holds."""
+        ...
+
+
+class Receiver(Protocol):
+    """Where frames come from."""
+
+    pattern: Take
+    """One frame of zeros: names, kind and units of the frames."""
+    fps: float | None
+    """Nominal frames a second, where it is known before."""
+    counters: Counters
+
+    @property
+    def finished(self) -> bool:
+        """Whether no more frames can come."""
+        ...
+
+    @property
+    def start_timecode(self) -> str:
+        """Of the first frame, as in Live Link Face's CSV; empty when unknown."""
+        ...
+
+    def wait(self, seconds: float) -> list[Frame]:
+        """The frames that have come, oldest first; after so many seconds also none."""
+        ...
+
+    def close(self) -> None:
+        """Let go of what it holds."""
+        ...

@@ -1,0 +1,49 @@
+"""Packets of iFacialMocap: text, ``name-INT|...|=head#x,y,z,...|``, names in any order.
+
+Weights are whole hundredths; the angles come in another convention than Live Link Face's, in
+degrees, and are left out.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from facert.live.frames import BadPacketError, Observed, frame_pattern
+from facert.names import ARKIT_SHAPES, canonical
+
+_FIELD = re.compile(r"([A-Za-z_]{1,40})[-&](-?\d{1,4})")
+_LEAST = len(ARKIT_SHAPES) // 2
+_PLACES = {name: place for place, name in enumerate(ARKIT_SHAPES)}
+
+
+class IFacialMocapDecoder:
+    """Understands iFacialMocap, both its versions; one packet is one frame."""
+
+    pattern = frame_pattern(ARKIT_SHAPES)
+    from_midnight = False
+
+    def __init__(self) -> None:
+        # Spellings are few and fixed, and folding one takes microseconds.
+        self._spelled: dict[str, int | None] = {}
+
+    def decode(self, packet: bytes) -> Observed | None:
+        """What the packet tells; see `facert.live.frames.Decoder`."""
+        try:
+            text = packet.decode("ascii")
+        except UnicodeDecodeError as error:
+            raise BadPacketError("not plain text") from error
+        values = np.full(len(ARKIT_SHAPES), np.nan)
+        for name, number in _FIELD.findall(text.partition("=")[0]):
+            place = self._place(name)
+            if place is not None:
+                values[place] = int(number) / 100.0
+        if np.isfinite(values).sum() < _LEAST:
+            raise BadPacketError("not iFacialMocap")
+        return Observed(values)
+
+    def _place(self, name: str) -> int | None:
+        if name not in self._spelled and len(self._spelled) < 16 * len(ARKIT_SHAPES):
+            self._spelled[name] = _PLACES.get(canonical(name))
+        return self._spelled.get(name)

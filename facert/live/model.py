@@ -1,0 +1,223 @@
+"""The model of a session, replaced without a pause when its file changes."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import facert
+from facert.errors import FacertError, InputError, NumericalError
+from facert.handling import Handling
+from facert.io.rate import nominal_rate
+from facert.live.frames import Frame
+
+if TYPE_CHECKING:
+    from facert.data import Take
+    from facert.retargeter import Retargeter
+    from facert.streaming import RetargetStream, Streamed
+
+log = logging.getLogger("facert")
+
+LOOK_EVERY = 0.5
+"""Seconds between two looks at the file."""
+NEAR = 0.2
+_WARMING = 30
+_MEASURED = 60
+"""Frames after which the rate of a source is known that does not state it."""
+
+Signature = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A retargeter with a stream of its own."""
+
+    retargeter: Retargeter
+    handling: Handling
+    stream: RetargetStream
+
+
+class ModelFile:
+    """A model file that may change at any time.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._seen: Signature | None = None
+
+    def changed(self) -> bool:
+        """Whether there is another file than the one that was loaded last, or tried."""
+        found = self._signature()
+        return found is not None and found != self._seen
+
+    def load(self) -> Retargeter:
+        """Read the file; raises InputError as `facert.load` does."""
+        self._seen = self._signature()
+        return facert.load(self.path)
+
+    def _signature(self) -> Signature | None:
+        """What changes with the file; None while there is none."""
+        try:
+            found = self.path.stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+class LiveModel:
+    """Maps frame after frame; while it is entered, it watches its file.
+
+    A new file is loaded beside the running stream and takes its place between two frames. One that
+    is broken, or of other controls, is warned about, and the model in use stays.
+
+    Parameters
+    ----------
+    file : ModelFile
+    retargeter : Retargeter
+        What was loaded from it.
+    pattern : Take
+        With the names, kind and units of the frames.
+    fps : float, optional
+        Nominal frames a second; measured when they are not known.
+    handling : callable, optional
+        What is done about bad markers, noise and single controls, for a model.
+
+    Raises
+    ------
+    InputError
+        When the model needs others.
+    """
+
+    def __init__(
+        self,
+        file: ModelFile,
+        retargeter: Retargeter,
+        pattern: Take,
+        fps: float | None = None,
+        handling: Callable[[Retargeter], Handling] | None = None,
+    ) -> None:
+        self._file, self._pattern, self._fps = file, pattern, fps
+        self._handling = handling or (lambda _: Handling())
+        self._loaded = self._prepare(retargeter)
+        self._next: Loaded | None = None
+        self._times: list[float] = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="facert model", daemon=True)
+
+    def __enter__(self) -> LiveModel:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    @property
+    def retargeter(self) -> Retargeter:
+        """The one in use."""
+        return self._loaded.retargeter
+
+    def step(self, frame: Frame) -> Streamed:
+        """The pose of the next frame.
+
+        Raises
+        ------
+        NumericalError
+            When it is not finite.
+        FacertError
+            When the frame cannot be mapped.
+        """
+        if self._next is not None:
+            self._loaded, self._next = self._next, None
+            log.info("%s: the new model is in use", self._file.path)
+        elif self._fps is None:
+            self._measure_rate(frame.time)
+        try:
+            pose = self._loaded.stream.step(frame.values)
+        except (np.linalg.LinAlgError, ArithmeticError) as error:
+            raise NumericalError(str(error)) from error
+        if not np.isfinite(pose.params).all():
+            raise NumericalError("the pose is not finite")
+        return pose
+
+    def _measure_rate(self, time: float) -> None:
+        """Begin again at the true rate when enough frames have told it."""
+        self._times.append(time)
+        if len(self._times) == _MEASURED:
+            self._fps = nominal_rate(np.array(self._times))
+            if not _is_near(self._fps, self.retargeter):
+                self._loaded = self._with_stream(self.retargeter, self._loaded.handling)
+
+    def _with_stream(self, retargeter: Retargeter, handling: Handling) -> Loaded:
+        names = self._pattern.source.names
+        return Loaded(retargeter, handling, retargeter.stream(names, self._fps, handling))
+
+    def _prepare(self, retargeter: Retargeter) -> Loaded:
+        """A stream for the session's frames, after one that made all code and caches warm."""
+        _require_fit(retargeter, self._pattern)
+        rest = retargeter.source_units.mean
+        if retargeter.source_kind == "markers":
+            rest = rest.reshape(-1, 3)
+        warming = retargeter.stream(retargeter.source_names, self._fps)
+        for _ in range(_WARMING):
+            warming.step(rest)
+        return self._with_stream(retargeter, self._handling(retargeter))
+
+    def _watch(self) -> None:
+        while not self._stop.wait(LOOK_EVERY):
+            if not self._file.changed():
+                continue
+            try:
+                self._next = self._reload()
+            except Exception as error:  # whatever is wrong with the file, the show goes on
+                reason = error if isinstance(error, FacertError) else repr(error)
+                log.warning("the model in use stays: %s", reason)
+
+    def _reload(self) -> Loaded:
+        retargeter = self._file.load()
+        if retargeter.controls.names != self.retargeter.controls.names:
+            raise InputError(
+                "/target/names",
+                "the controls that the session began with",
+                "others",
+                "Stop, and begin again with this model.",
+                str(self._file.path),
+            )
+        if retargeter.layout != self.retargeter.layout:
+            raise InputError(
+                "/source/names",
+                "the markers or weights that the session began with, in their order",
+                "others",
+                "Stop, and begin again with this model.",
+                str(self._file.path),
+            )
+        return self._prepare(retargeter)
+
+
+def _is_near(fps: float, retargeter: Retargeter) -> bool:
+    """Whether frames come about as often as in training: then a stream may as well go on."""
+    motion = retargeter.motion
+    return motion is None or abs(fps * motion.clock[0] - 1.0) < NEAR
+
+
+def _require_fit(retargeter: Retargeter, pattern: Take) -> None:
+    """Refuse frames of another kind, or in other units."""
+    retargeter.layout.require_kind(pattern.source.kind)
+    if retargeter.units and pattern.units not in ("", retargeter.units):
+        raise InputError("units", retargeter.units, pattern.units, "Convert the take to these.")

@@ -1,0 +1,164 @@
+"""Where frames come from: a UDP socket, or a take that is played in real time."""
+
+from __future__ import annotations
+
+import math
+import select
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from facert.data import FloatArray, Take
+from facert.io.livelink import TICKS, format_timecode
+from facert.live.frames import BadPacketError, Counters, Decoder, Frame, Observed, frame_pattern
+from facert.live.order import Order
+
+BUFFER = 2**22
+"""Bytes that the system is asked to keep for us while we are busy."""
+AT_ONCE = 256
+AT_MOST = 0.005
+"""Packets, and seconds, before frames are mapped: a flood must not keep us from that."""
+_LARGEST = 2**16
+
+
+class UdpReceiver:
+    """Frames from a socket.
+
+    Parameters
+    ----------
+    listening : socket
+        Bound; it is closed with this.
+    decoder : Decoder
+    """
+
+    fps: float | None = None
+    finished = False
+
+    def __init__(self, listening: socket.socket, decoder: Decoder) -> None:
+        self.pattern, self.counters = decoder.pattern, Counters()
+        self.start_timecode = ""
+        self._socket, self._decoder, self._order = listening, decoder, Order()
+        self._socket.setblocking(False)
+        with suppress(OSError):
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def wait(self, seconds: float) -> list[Frame]:
+        """The frames that have come; see `facert.live.frames.Receiver`."""
+        frames: list[Frame] = []
+        if not select.select([self._socket], [], [], seconds)[0]:
+            return frames
+        end = time.perf_counter() + AT_MOST
+        for packet, host, arrived in self._waiting():
+            frame = self._frame(packet, host, arrived)
+            if frame is not None:
+                frames.append(frame)
+            if arrived > end:
+                break
+        return frames
+
+    def _waiting(self) -> Iterator[tuple[bytes, str, float]]:
+        """Packets that are there, with their senders' hosts and when they were fetched."""
+        for _ in range(AT_ONCE):
+            try:
+                packet, address = self._socket.recvfrom(_LARGEST)
+            except BlockingIOError:
+                return
+            except OSError:  # Windows tells here of packets that nobody took
+                continue
+            yield packet, str(address[0]), time.perf_counter()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _frame(self, packet: bytes, host: str, arrived: float) -> Frame | None:
+        """The frame that a packet completes, if it does and comes in turn."""
+        if not self._order.admits(host, arrived):
+            self.counters.late += 1
+            return None
+        try:
+            observed = self._decoder.decode(packet)
+        except BadPacketError:
+            self.counters.bad += 1
+            return None
+        if observed is None:
+            return None
+        placed = self._order.place(observed, host, arrived)
+        if placed is None:
+            self.counters.late += 1
+            return None
+        return self._seen(observed, placed, arrived)
+
+    def _seen(self, observed: Observed, placed: float, arrived: float) -> Frame | None:
+        """The frame, unless nothing was seen in it."""
+        first = not self.counters.received
+        if not _count_seen(observed.values, self.counters):
+            return None
+        if first and self._decoder.from_midnight and observed.stamp is not None:
+            self.start_timecode = format_timecode(round(observed.stamp * TICKS))
+        return Frame(placed, observed.values, arrived)
+
+
+class TakeReceiver:
+    """Plays a take at the times of its frames.
+
+    Parameters
+    ----------
+    take : Take
+    speed : float
+        2 plays it twice as fast.
+    """
+
+    def __init__(self, take: Take, speed: float = 1.0) -> None:
+        self.pattern = frame_pattern(take.source.names, take.source.kind, take.units)
+        self.counters = Counters()
+        self.fps: float | None = take.fps
+        self.start_timecode = take.start_timecode
+        self._time = take.time - take.time[0]
+        self._due = self._time / speed
+        self._values, self._next = take.source.values, 0
+        self._began = math.nan
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last frame was played."""
+        return self._next == len(self._time)
+
+    def wait(self, seconds: float) -> list[Frame]:
+        """The frames that are due; see `facert.live.frames.Receiver`."""
+        if self.finished:
+            return []
+        if math.isnan(self._began):
+            self._began = time.perf_counter()
+        time.sleep(
+            min(seconds, max(0.0, self._began + self._due[self._next] - time.perf_counter()))
+        )
+        now = time.perf_counter()
+        last = int(np.searchsorted(self._due, now - self._began, side="right"))
+        first, self._next = self._next, max(last, self._next)
+        return [
+            Frame(float(self._time[row]), self._values[row], now)
+            for row in range(first, self._next)
+            if _count_seen(self._values[row], self.counters)
+        ]
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _count_seen(values: FloatArray, counters: Counters) -> bool:
+    """Whether anything was observed, which is counted."""
+    seen = not np.isnan(values).all()
+    if seen:
+        counters.received += 1
+    else:
+        counters.hidden += 1
+    return seen

@@ -1,0 +1,265 @@
+"""A method for each region of the face, blended where a control belongs to several.
+
+A region's method never sees the rest of the face: whatever its controls do, its own markers say so.
+It works in units of its own, those that it would have if the region were all there is: a lid is to
+its region what a jaw is to the face.
+
+With w_rc the weight of region r in control c, which sum to 1, and y_rc, s_rc what the region says,
+
+    y_c = Σ_r w_rc y_rc,      s_c² = Σ_r w_rc s_rc²,
+
+the variance of the blend if the errors of regions go together, and more than it otherwise. One
+region of everything is the method itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray
+from facert.errors import InputError
+from facert.learned import DAMAGED, Arrays
+from facert.methods import make_method
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.optim.monitor import Monitor
+from facert.regions.nouns import MOST
+from facert.settings import Settings
+
+WHOLE = 1e-9  # by which the weights of a control may miss 1
+
+
+@dataclass(frozen=True, eq=False)
+class Layout(Arrays):
+    """What each of r regions sees and moves, in columns of normalised arrays.
+
+    Parameters
+    ----------
+    columns : array, shape (r, d_x)
+        1 for what a region sees of the source, else 0.
+    weights : array, shape (r, d_y)
+        Its weight in each control; 0 for those that it does not move. They sum to 1 over regions.
+    units : array, shape (r, 2)
+        Normalised units of the region in those of the face, of source and target.
+    noise : array, shape (r, 2)
+        σ_c and the noise floor of the source, in the region's units.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {
+        "columns": "rx",
+        "weights": "ry",
+        "units": "r2",
+        "noise": "r2",
+    }
+
+    columns: FloatArray
+    weights: FloatArray
+    units: FloatArray
+    noise: FloatArray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.columns) > MOST:
+            raise InputError("layout", f"at most {MOST} regions", f"{len(self.columns)}", DAMAGED)
+        if not self.columns.any(axis=1).all() or not self.weights.any(axis=1).all():
+            raise InputError("layout", "regions that see and move something", "another", DAMAGED)
+        if (self.weights < 0).any() or (np.abs(self.weights.sum(axis=0) - 1.0) > WHOLE).any():
+            raise InputError("layout.weights", "weights that sum to 1", "others", DAMAGED)
+        if not (self.units > 0).all():
+            raise InputError("layout.units", "numbers above 0", "others", DAMAGED)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One region: its method, what of the face it sees and moves, and its units."""
+
+    method: Method
+    columns: IntArray
+    controls: IntArray
+    source_unit: float
+    target_unit: float
+
+    def labelled(self, whole: Labelled) -> Labelled:
+        return Labelled(self._frames(whole.X), self._poses(whole.Y))
+
+    def unlabelled(self, whole: Unlabelled) -> Unlabelled:
+        bounds = None if whole.bounds is None else self._poses(whole.bounds)
+        return Unlabelled(self._frames(whole.X), self._poses(whole.Y), bounds)
+
+    def observed(
+        self, X: FloatArray, doubt: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Frames and the variance of what was filled in, in the region's units."""
+        if doubt is None:
+            return self._frames(X), None
+        return self._frames(X), doubt.take(self.columns, axis=1) / self.source_unit**2
+
+    def in_face_units(self, said: Prediction) -> Prediction:
+        std = None if said.std is None else said.std * self.target_unit
+        return Prediction(said.Y * self.target_unit, std, said.X * self.source_unit)
+
+    # take, unlike an index, keeps the order in memory: sums of all columns come out the same.
+
+    def _frames(self, X: FloatArray) -> FloatArray:
+        return X.take(self.columns, axis=1) / self.source_unit
+
+    def _poses(self, Y: FloatArray) -> FloatArray:
+        return Y.take(self.controls, axis=1) / self.target_unit
+
+
+class Regional:
+    """The method of the settings, once a region.
+
+    Parameters
+    ----------
+    settings : Settings
+        With regions, for their names.
+    layout : Layout, optional
+        Of the same regions in the same order; `load` finds it in the file.
+    """
+
+    most_unlabelled: ClassVar[int | None] = None
+    stepwise: ClassVar[bool] = False
+
+    def __init__(self, settings: Settings, layout: Layout | None = None) -> None:
+        self.settings = settings
+        if layout is not None:
+            self._set_layout(layout)
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """d_x and d_y of the face."""
+        return self.layout_.columns.shape[1], self.layout_.weights.shape[1]
+
+    def fit(
+        self,
+        labelled: Labelled,
+        unlabelled: Unlabelled,
+        monitor: Monitor | None = None,  # noqa: ARG002  it could not tell one region from another
+    ) -> Report:
+        """Train the method of each region on its part of the data.
+
+        Parameters
+        ----------
+        labelled, unlabelled : Labelled, Unlabelled
+            Of the face, normalised and complete.
+        monitor : Monitor, optional
+            Not used.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            When the training of a region was interrupted: the others have none.
+        """
+        reports = []
+        for part in self.parts_:
+            report = part.method.fit(part.labelled(labelled), part.unlabelled(unlabelled))
+            if report.result is not None and report.result.status == "interrupted":
+                raise KeyboardInterrupt
+            reports.append(report)
+        return Report(figures=_figures(self._names, reports))
+
+    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+        """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
+        said = [part.method.predict(*part.observed(frames, doubt)) for part in self.parts_]
+        return self._blend(said, frames)
+
+    def stream(self) -> Stream:
+        """Begin to map frames one after the other, a stream a region."""
+        return _RegionalStream(self)
+
+    def save(self) -> dict[str, FloatArray]:
+        """The layout, and what each method learned."""
+        arrays = {f"layout.{name}": array for name, array in self.layout_.arrays.items()}
+        for index, part in enumerate(self.parts_):
+            arrays |= {f"{index}.{name}": array for name, array in part.method.save().items()}
+        return arrays
+
+    def load(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Take over what `save` returned.
+
+        Raises
+        ------
+        InputError
+            When an array is absent or the shapes do not fit together.
+        """
+        try:
+            self._set_layout(Layout.of(arrays, "layout."))
+        except KeyError as error:
+            raise InputError("method", "regions", f"no {error.args[0]}", DAMAGED) from None
+        for index, part in enumerate(self.parts_):
+            start = f"{index}."
+            own = {n.removeprefix(start): a for n, a in arrays.items() if n.startswith(start)}
+            part.method.load(own)
+            if part.method.dimensions != (len(part.columns), len(part.controls)):
+                expected = f"{len(part.columns)} and {len(part.controls)} columns"
+                found = f"{part.method.dimensions}"
+                raise InputError(f"region {self._names[index]}", expected, found, DAMAGED)
+
+    @property
+    def _names(self) -> Sequence[str]:
+        regions = self.settings.regions
+        return [] if regions is None or isinstance(regions, str) else regions.names
+
+    def _set_layout(self, layout: Layout) -> None:
+        if len(layout.columns) != len(self._names):
+            expected, found = f"{len(self._names)} regions", f"{len(layout.columns)}"
+            raise InputError("layout", expected, found, DAMAGED)
+        self.layout_ = layout
+        self.parts_ = [self._part(index) for index in range(len(layout.columns))]
+
+    def _part(self, index: int) -> _Part:
+        layout = self.layout_
+        sigma_c, floor = layout.noise[index].tolist()
+        own = replace(self.settings, regions=None, sigma_c=sigma_c, source_noise_floor=floor)
+        return _Part(
+            make_method(own),
+            np.flatnonzero(layout.columns[index]),
+            np.flatnonzero(layout.weights[index]),
+            *layout.units[index].tolist(),
+        )
+
+    def _blend(self, said: Sequence[Prediction], frames: FloatArray) -> Prediction:
+        """What regions say of frames (T, d_x); what none sees of the source stays as it is."""
+        poses = np.zeros((len(frames), self.layout_.weights.shape[1]))
+        variances, seen = np.zeros_like(poses), np.zeros_like(frames)
+        tells_std = all(prediction.std is not None for prediction in said)
+        for part, weights, own in zip(self.parts_, self.layout_.weights, said, strict=True):
+            face, w = part.in_face_units(own), weights[part.controls]
+            poses[:, part.controls] += w * face.Y
+            seen[:, part.columns] += face.X
+            if face.std is not None:
+                variances[:, part.controls] += w * face.std**2
+        eyes = self.layout_.columns.sum(axis=0)
+        source = np.where(eyes > 0, seen / np.maximum(eyes, 1.0), frames)
+        return Prediction(poses, np.sqrt(variances) if tells_std else None, source)
+
+
+class _RegionalStream:
+    def __init__(self, method: Regional) -> None:
+        self.method = method
+        self.streams = [part.method.stream() for part in method.parts_]
+
+    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+        """Map one more frame (1, d_x)."""
+        parts = zip(self.streams, self.method.parts_, strict=True)
+        said = [stream.step(*part.observed(frame, doubt)) for stream, part in parts]
+        return self.method._blend(said, frame)
+
+
+def _figures(names: Sequence[str], reports: Sequence[Report]) -> dict[str, float]:
+    """What all regions have in common once, the rest under the names of the regions."""
+    first, *others = (report.figures for report in reports)
+    common = {
+        name: value for name, value in first.items() if all(o.get(name) == value for o in others)
+    }
+    own = {
+        f"{name}: {figure}": value
+        for name, report in zip(names, reports, strict=True)
+        for figure, value in report.figures.items()
+        if figure not in common
+    }
+    return {**common, **own}

@@ -1,0 +1,53 @@
+"""What a model file holds of a trained view of the shared models.
+
+An exact view is its latents and observations, from which the rest is made again; a sparse one its
+inducing latents and what they foretell, whatever number of frames it was learned from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from facert.data import FloatArray
+from facert.errors import InputError
+from facert.gp.kernel import Kernel
+from facert.gp.posterior import Posterior, Predictor
+from facert.learned import DAMAGED, check_axes
+
+EXACT = {"latents": "nq", "observations": "nd", "kernel": "3"}
+SPARSE = {"latents": "mq", "whitener": "mm", "weights": "md", "kernel": "3"}
+
+
+def view_arrays(view: Predictor) -> dict[str, FloatArray]:
+    """The arrays of a view by their names."""
+    kernel = view.kernel
+    arrays = {
+        "latents": view.Z,
+        "kernel": np.array([kernel.variance, kernel.inverse_width, kernel.noise]),
+    }
+    if isinstance(view, Posterior):
+        return arrays | {"observations": view.X}
+    return arrays | {"whitener": view.whitener, "weights": np.ascontiguousarray(view.alpha)}
+
+
+def view_from(arrays: Mapping[str, FloatArray], name: str) -> Predictor:
+    """A view from the arrays of a file, where they bear its name.
+
+    Raises
+    ------
+    InputError
+        When one is absent, or their shapes do not fit together.
+    """
+    own = {n.removeprefix(f"{name}."): a for n, a in arrays.items() if n.startswith(f"{name}.")}
+    sparse = "whitener" in own
+    axes = {f"{name}.{part}": letters for part, letters in (SPARSE if sparse else EXACT).items()}
+    check_axes(arrays, axes)
+    theta = own["kernel"]
+    if not (theta > 0).all():
+        raise InputError(f"{name}.kernel", "three positive numbers", f"{theta}", DAMAGED)
+    kernel = Kernel(*theta.tolist())
+    if sparse:
+        return Predictor(own["latents"], own["whitener"], own["weights"], kernel)
+    return Posterior(own["latents"], own["observations"], kernel)

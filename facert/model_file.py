@@ -1,0 +1,153 @@
+"""Model files: everything that retargeting needs, in one safetensors file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+import facert
+from facert.cleaning.motion import Motion
+from facert.data import Controls, FloatArray, SourceKind
+from facert.errors import InputError, reading
+from facert.io.tensors import read_tensors, write_tensors
+from facert.learned import check_axes
+from facert.methods import make_method
+from facert.normalisation import Normalisation
+from facert.retargeter import Retargeter
+from facert.settings import Settings
+from facert.source_layout import SourceLayout
+
+FORMAT = "facert-model"
+
+
+def save(retargeter: Retargeter, path: Path, overwrite: bool) -> None:
+    """Write everything to one safetensors file.
+
+    Raises
+    ------
+    OutputExistsError
+        When the file exists and `overwrite` is false.
+    """
+    arrays = {f"method.{name}": array for name, array in retargeter.method.save().items()}
+    for view, units in (("source", retargeter.source_units), ("target", retargeter.target_units)):
+        arrays[f"{view}.mean"] = units.mean
+        arrays[f"{view}.scale"] = np.array([units.scale])
+    if retargeter.controls.limits is not None:
+        arrays["target.limits"] = retargeter.controls.limits
+    if retargeter.bounds is not None:
+        arrays["target.bounds"] = retargeter.bounds
+    if retargeter.poses is not None:
+        arrays["target.poses"] = retargeter.poses
+    if np.isfinite(retargeter.neutral).all():  # else an earlier version did not know it
+        arrays["source.neutral"] = retargeter.neutral
+    if retargeter.motion is not None:
+        arrays |= {f"motion.{n}": array for n, array in retargeter.motion.arrays.items()}
+    metadata = {
+        "format": FORMAT,
+        "format_version": 1,
+        "created_by": f"facert {facert.__version__}",
+        "versions": library_versions(),
+        **retargeter.facts,
+    }
+    write_tensors(path, arrays, metadata, overwrite)
+
+
+def load(path: str | Path) -> Retargeter:
+    """Read a retargeter from a model file.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged, not a model, or does not fit together.
+    """
+    arrays, metadata = read_tensors(Path(path), FORMAT)
+    with reading(path):
+        try:
+            settings = Settings().with_changes(metadata["settings"])
+            kind, names = metadata["source_kind"], tuple(map(str, metadata["source_names"]))
+            controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
+            bounds = Controls(controls.names, arrays.get("target.bounds")).limits
+            figures = dict(metadata.get("figures", {}))
+            source_units, target_units = (
+                Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
+                for view in ("source", "target")
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(
+                "the metadata", "a complete model", f"{error!r}", "Train the model again."
+            ) from None
+        method = make_method(settings)
+        method.load(
+            {n.removeprefix("method."): a for n, a in arrays.items() if n.startswith("method.")}
+        )
+        retargeter = Retargeter(
+            method=method,
+            layout=SourceLayout(kind, names),
+            units=str(metadata.get("units", "")),
+            controls=controls,
+            bounds=bounds,
+            source_units=source_units,
+            target_units=target_units,
+            figures=figures,
+            neutral=arrays.get("source.neutral", np.full(source_units.mean.shape, np.nan)),
+            poses=arrays.get("target.poses"),
+            motion=_motion(arrays),
+        )
+        _check_fit(retargeter, arrays)
+    return retargeter
+
+
+def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:
+    """A take in which nothing could be told of motion leaves none."""
+    own = {n.removeprefix("motion."): a for n, a in arrays.items() if n.startswith("motion.")}
+    if not own:
+        return None
+    check_axes(own, Motion.all_axes())
+    positive = [own[name] for name in ("rates", "rest", "rest_rates", "clock", "factors.noise")]
+    if not all((array > 0.0).all() for array in positive):
+        raise _misfit("motion", "numbers above 0", "others")
+    return Motion.of(own)
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of what computed a result, for its metadata."""
+    return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
+
+
+def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None:
+    """Refuse a file whose parts disagree: mapping would fail, or worse, not fail."""
+    kind, names = retargeter.source_kind, retargeter.source_names
+    if kind not in get_args(SourceKind):
+        raise _misfit("source_kind", "markers or weights", repr(kind))
+    if len(set(names)) < len(names):
+        raise _misfit("source_names", "names that are all different", "one of them twice")
+    _check_poses(retargeter.poses, len(retargeter.controls.names))
+    columns = len(names) * (3 if kind == "markers" else 1), len(retargeter.controls.names)
+    for view, count, learned in zip(
+        ("source", "target"), columns, retargeter.method.dimensions, strict=True
+    ):
+        mean, scale = arrays[f"{view}.mean"], arrays[f"{view}.scale"]
+        if mean.shape != (count,):
+            raise _misfit(f"{view}.mean", f"{count} numbers", f"shape {mean.shape}")
+        if learned != count:
+            raise _misfit(f"{view}.observations", f"{count} columns", f"{learned}")
+        if not scale.item() > 0.0:
+            raise _misfit(f"{view}.scale", "a number above 0", f"{scale.item()}")
+    if retargeter.neutral.shape != columns[:1]:
+        raise _misfit("source.neutral", f"{columns[0]} numbers", f"{retargeter.neutral.shape}")
+    if retargeter.motion is not None and len(retargeter.motion.rest) != columns[0]:
+        raise _misfit("motion.rest", f"{columns[0]} numbers", f"{len(retargeter.motion.rest)}")
+
+
+def _check_poses(poses: FloatArray | None, controls: int) -> None:
+    """A file of an earlier version has none."""
+    if poses is not None and (poses.ndim != 2 or poses.shape[1] != controls):
+        raise _misfit("target.poses", f"{controls} columns", f"shape {poses.shape}")
+
+
+def _misfit(field: str, expected: str, found: str) -> InputError:
+    return InputError(field, expected, found, "Train the model again.")

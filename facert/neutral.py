@@ -1,0 +1,70 @@
+"""The actor at rest: the same expression in the recording that was learned from and in another.
+
+Markers are stuck on anew, a tracker is calibrated anew; the difference at rest is taken out before
+frames are mapped. Weights are bounded: their rest is moved and what is above it stretched, so that
+a closed lid stays a closed lid.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, SourceKind
+from facert.errors import InputError
+
+log = logging.getLogger(__name__)
+
+RESTLESS = 0.3
+"""Motion of this share of the take's is no rest."""
+FULL = 1.0
+"""A weight that is fully there."""
+
+
+def calibrated(X: FloatArray, own: FloatArray, learned: FloatArray, kind: SourceKind) -> FloatArray:
+    """Frames as the actor would have shown them in the recording that was learned from.
+
+    Parameters
+    ----------
+    X : array, shape (T, d)
+        NaN: not observed.
+    own, learned : array, shape (d,)
+        The actor at rest in this and in that recording; NaN: not known, nothing is changed.
+    kind : {"markers", "weights"}
+    """
+    shift = np.nan_to_num(learned - own)
+    if kind == "markers":
+        return X + shift
+    own = np.where(np.isnan(own) | np.isnan(learned), 0.0, own)
+    learned = own + shift
+    stretch = np.where(own < FULL, (FULL - learned) / np.where(own < FULL, FULL - own, 1.0), 1.0)
+    above = learned + (X - own) * np.maximum(stretch, 0.0)
+    return np.where(X > own, above, X + shift)
+
+
+def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
+    """The mean of some frames, (d,); NaN where none of them shows anything.
+
+    Raises
+    ------
+    InputError
+        When the frames are not all there.
+    """
+    if not len(frames) or frames.min() < 0 or frames.max() >= len(X):
+        found = "none" if not len(frames) else f"{frames.min()} to {frames.max()}"
+        raise InputError(
+            "neutral", f"frames from 0 to {len(X) - 1}", found, "Name frames of this take."
+        )
+    motion, typical = X[frames].std(axis=0), np.nanstd(X, axis=0).max()
+    if np.nanmax(motion, initial=0.0) > RESTLESS * typical:
+        log.warning("the actor moves in the frames named as neutral: their mean is taken for rest")
+    seen = ~np.isnan(X[frames])
+    total = np.where(seen, X[frames], 0.0).sum(axis=0)
+    return np.where(seen.any(axis=0), total / np.maximum(seen.sum(axis=0), 1), np.nan)
+
+
+def most_neutral(poses: FloatArray) -> int:
+    """Which of the poses (n, P) moves the character least from all controls at zero."""
+    reach = np.maximum(np.abs(poses).max(axis=0), np.finfo(float).tiny)
+    return int(np.square(poses / reach).sum(axis=1).argmin())

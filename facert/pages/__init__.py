@@ -1,0 +1,5 @@
+"""Pages in the browser: to look at a performance, and to pose.
+
+What is shown and what a click means is in plain classes (`playback`, `performance`, `desk`,
+`session`) that know of no browser. `view_page` and `pose_page` lay them out with viser.
+"""

@@ -1,0 +1,152 @@
+"""A pose in the making: some controls are pinned, the others follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from facert.data import Controls, FloatArray, IntArray
+from facert.posing.completion import Completion, Posed
+from facert.posing.correction import correct
+from facert.posing.known import Given, KnownPoses
+from facert.posing.pose import FAR
+
+KEPT = 32  # sets of pinned controls whose completion is kept: going back to one costs nothing
+
+
+class Desk:
+    """A pose of which the user holds some controls.
+
+    Without a pose to begin with, the others follow by `facert.posing.completion`; from one that
+    was retargeted, they are corrected with the pinned ones by `facert.posing.correction`. Without
+    known poses they stay.
+
+    Parameters
+    ----------
+    controls : Controls
+        P of them.
+    known : KnownPoses, optional
+        Poses that the character is known to make.
+    """
+
+    def __init__(self, controls: Controls, known: KnownPoses | None = None) -> None:
+        self.controls = controls
+        self.known = known
+        self.pins: dict[int, float] = {}
+        self._completions: dict[tuple[int, ...], Completion] = {}
+        self._start: FloatArray | None = None
+        self._start_std: FloatArray | None = None
+        self._posed = self._solve(0, 0)
+
+    @property
+    def pose(self) -> FloatArray:
+        """The pose, (P,)."""
+        return self._posed.pose
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviation of each control, (P,); 0 of those that are pinned."""
+        return self._posed.std
+
+    @property
+    def rest(self) -> FloatArray:
+        """The neutral pose, (P,): every control at 0, or as near as its limits allow."""
+        return np.clip(np.zeros(len(self.controls.names)), *slider_bounds(self).T)
+
+    @property
+    def from_neutral(self) -> bool:
+        """Whether nothing was there to begin with but the neutral pose."""
+        return self._start is None
+
+    @property
+    def far(self) -> bool:
+        """Whether no known pose comes near what is pinned: then the rest of the pose is a guess."""
+        if self.known is None or self._start is not None or not self.pins:
+            return False
+        given = self._given()
+        return self._completion(given.controls).farness(given.values) > FAR
+
+    def begin(self, pose: FloatArray | None, std: FloatArray | None = None) -> None:
+        """Start from a pose (P,) with nothing pinned; from the neutral one without it."""
+        self.pins = {}
+        self._start, self._start_std = pose, std
+        self._posed = self._solve(0, 0)
+
+    def pin(self, control: int, value: float) -> None:
+        """Hold a control at a value."""
+        self.pins[control] = value
+        self._posed = self._solve(0, 0)
+
+    def pin_all(self, pins: Mapping[int, float]) -> None:
+        """Hold some controls as well."""
+        self.pins |= pins
+        self._posed = self._solve(0, 0)
+
+    def let_go(self, control: int) -> None:
+        """Let a control follow the others again."""
+        self.pins.pop(control, None)
+        self._posed = self._solve(0, 0)
+
+    def let_all_go(self) -> None:
+        """Let all controls follow."""
+        self.begin(self._start, self._start_std)
+
+    def learn(self, known: KnownPoses | None) -> None:
+        """Learn from other known poses."""
+        self.known = known
+        self._completions = {}
+        self._posed = self._solve(0, 0)
+
+    def samples(self, count: int, seed: int) -> FloatArray:
+        """Other plausible poses with the same pins, (count, P); none without known poses."""
+        return self._solve(count, seed).samples
+
+    def adopt(self, sample: FloatArray) -> None:
+        """Go on from a sample: the pins stay, and the other controls begin where it has them."""
+        self._start, self._start_std = sample, None
+        self._posed = self._solve(0, 0)
+
+    def _solve(self, samples: int, seed: int) -> Posed:
+        base = self.rest if self._start is None else self._start
+        given = self._given()
+        if self.known is None:
+            pose = base.copy()
+            pose[given.controls] = given.values
+            return Posed(pose, np.zeros_like(pose), np.empty((0, len(pose))))
+        rng = np.random.default_rng(seed)
+        if self.pins and self._start is None:
+            return self._completion(given.controls).pose(given, samples, rng)
+        if self.pins:
+            return correct(base, self._start_std, self.known, given, samples, rng)
+        spread = np.zeros_like(base) if self._start_std is None else self._start_std
+        drawn = self.known.poses[rng.permutation(len(self.known.poses))[:samples]]
+        return Posed(base, spread, drawn)
+
+    def _given(self) -> Given:
+        chosen = sorted(self.pins)
+        values = np.array([self.pins[control] for control in chosen], dtype=np.float64)
+        return Given(np.array(chosen, dtype=np.int64), values)
+
+    def _completion(self, given: IntArray) -> Completion:
+        """Learned once for each set of pinned controls."""
+        assert self.known is not None  # the caller has looked
+        key = tuple(given.tolist())
+        if key not in self._completions:
+            while len(self._completions) >= KEPT:
+                self._completions.pop(next(iter(self._completions)))
+            self._completions[key] = Completion.learn(self.known, given)
+        return self._completions[key]
+
+
+def slider_bounds(desk: Desk) -> FloatArray:
+    """Lowest and highest value of each control's slider, (P, 2).
+
+    The declared limits; where there are none, what is known, and 0 to 1 in any case.
+    """
+    limits = desk.controls.limits
+    bounds = np.tile([0.0, 1.0], (len(desk.controls.names), 1))
+    if desk.known is not None:
+        low, high = desk.known.poses.min(axis=0), desk.known.poses.max(axis=0)
+        bounds = np.stack([np.minimum(low, 0.0), np.maximum(high, 1.0)], axis=1)
+    return bounds if limits is None else np.where(np.isfinite(limits), limits, bounds)

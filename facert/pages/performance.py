@@ -1,0 +1,161 @@
+"""What a page shows of a performance: faces, how far off they are, and where to look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from facert.data import FloatArray, IntArray, Rig, Take
+from facert.errors import InputError
+from facert.metrics import compare, vertex_errors, vertex_gram
+from facert.names import shape_drivers
+from facert.pages.paint import Scale
+from facert.view.faces import Face, posed_face
+
+if TYPE_CHECKING:
+    from facert.retargeter import Retargeter
+
+APART = 0.5  # seconds between two frames that are listed
+_LOOKED_AT = 48  # frames that tell how far a scale goes
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """A take of poses, with what is known beside it.
+
+    Parameters
+    ----------
+    take : Take
+        Frames of the source; with poses, and their standard deviation, if there are some.
+    key_poses : array of int
+        Frames that somebody posed.
+    rig : Rig, optional
+        The character.
+    truth : Take, optional
+        True poses of the same frames.
+
+    Raises
+    ------
+    InputError
+        When rig or truth do not fit the take.
+    """
+
+    take: Take
+    key_poses: IntArray
+    rig: Rig | None = None
+    truth: Take | None = None
+
+    def __post_init__(self) -> None:
+        if self.truth is None:
+            return
+        if len(self.truth) != len(self.take):
+            expected, found = f"{len(self.take)} frames", f"{len(self.truth)}"
+            raise InputError("--truth", expected, found, "Give the truth of this take.")
+        if compare(self.truth, self.take) is None:
+            expected, found = "poses of the take's controls", "others, or none"
+            raise InputError("--truth", expected, found, "Give the truth of this take.")
+
+    @cached_property
+    def face(self) -> Face | None:
+        """The character, where rig and poses are known."""
+        if self.rig is None or not len(self.take.labels):
+            return None
+        return posed_face(self.take, self.rig, "character")
+
+    @cached_property
+    def true_face(self) -> Face | None:
+        """The character in the true poses."""
+        if self.rig is None or self.truth is None:
+            return None
+        return posed_face(self.truth, self.rig, "truth")
+
+    @cached_property
+    def doubt(self) -> FloatArray | None:
+        """Standard deviation of the pose, root mean square over controls, (T,)."""
+        std = self.take.std
+        return None if std is None else np.asarray(np.sqrt(np.mean(std**2, axis=1)))
+
+    @cached_property
+    def true_params(self) -> FloatArray | None:
+        """The true poses in the order of the take's controls, (T, P)."""
+        if self.truth is None or self.truth.params is None:
+            return None
+        assert self.truth.controls is not None  # poses come with controls
+        assert self.take.controls is not None
+        columns = [self.truth.controls.names.index(name) for name in self.take.controls.names]
+        return np.asarray(self.truth.params[:, columns])
+
+    @cached_property
+    def errors(self) -> FloatArray | None:
+        """How far each frame is off, (T,): in the rig's units if there is one, else of a control.
+
+        Root mean square over vertices or controls; NaN where the truth or the pose is not known.
+        """
+        if self.true_params is None or self.take.params is None:
+            return None
+        off = self.take.params - self.true_params
+        if self.rig is None:
+            return np.asarray(np.sqrt(np.mean(off**2, axis=1)))
+        assert self.take.controls is not None
+        return vertex_errors(off, vertex_gram(self.rig, self.take.controls))
+
+    def vertex_errors(self, frame: int) -> FloatArray | None:
+        """How far each vertex is off in a frame, (V,), in the rig's units."""
+        if self.face is None or self.true_face is None:
+            return None
+        rows = np.array([frame])
+        off = self.face.motion.fetch(rows)[0] - self.true_face.motion.fetch(rows)[0]
+        return np.asarray(np.linalg.norm(off, axis=1))
+
+    def vertex_doubt(self, frame: int) -> FloatArray | None:
+        """Standard deviation of each vertex in a frame, (V,), controls taken as independent."""
+        if self._squared_shapes is None or self.take.std is None:
+            return None
+        return np.asarray(np.sqrt(self.take.std[frame] ** 2 @ self._squared_shapes))
+
+    @cached_property
+    def _squared_shapes(self) -> FloatArray | None:
+        """How far a control moves each vertex, squared, (P, V)."""
+        if self.rig is None or self.take.controls is None:
+            return None
+        drivers = shape_drivers(self.take.controls.names, self.rig.names)
+        shapes = np.tensordot(drivers, self.rig.shapes, axes=1)
+        return np.asarray(np.sum(shapes**2, axis=2))
+
+    def scale(self) -> Scale:
+        """Colours for what `vertex_errors`, else `vertex_doubt`, tell."""
+        units = self.rig.units if self.rig is not None else ""
+        some = np.unique(np.linspace(0, len(self.take) - 1, _LOOKED_AT).astype(int)).tolist()
+        measure = self.vertex_errors if self.true_face is not None else self.vertex_doubt
+        found = [values for frame in some if (values := measure(frame)) is not None]
+        values = np.array(found)
+        return Scale.of(values[np.isfinite(values)], units)
+
+
+def retargeted(
+    take: Take, retargeter: Retargeter, rig: Rig | None = None, truth: Take | None = None
+) -> Performance:
+    """A take as a model retargets it.
+
+    The take's own poses are key poses; where it is posed throughout and no other truth is given,
+    they are the truth.
+    """
+    posed_throughout = len(take.labels) == len(take)
+    result = replace(retargeter.retarget(take), source=take.source)
+    if truth is None and posed_throughout:
+        truth = take
+    return Performance(result, take.labels[:0] if posed_throughout else take.labels, rig, truth)
+
+
+def highest(values: FloatArray, time: FloatArray, count: int) -> list[int]:
+    """Frames of the highest values (T,), highest first, `APART` or more from each other."""
+    left = np.where(np.isfinite(values), values, -np.inf)
+    chosen: list[int] = []
+    while len(chosen) < count and np.isfinite(left.max()):
+        frame = int(left.argmax())
+        chosen.append(frame)
+        left[np.abs(time - time[frame]) < APART] = -np.inf
+    return chosen

@@ -1,0 +1,263 @@
+"""The page of `facert pose --view`: pose a frame, save it, train, look, pose the next."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from viser import Icon
+
+from facert.data import Rig
+from facert.errors import InputError
+from facert.pages.desk import Desk, slider_bounds
+from facert.pages.playback import Playback
+from facert.pages.pose_stage import SAMPLES, PoseStage
+from facert.pages.server import complainer
+from facert.pages.session import Session, Trained
+from facert.pages.sliders import Pins, Sliders
+from facert.pages.timeline import Places, Timeline
+from facert.pages.worker import Worker
+from facert.view.faces import Face
+
+if TYPE_CHECKING:
+    from viser import GuiHtmlHandle, ViserServer
+
+log = logging.getLogger(__name__)
+
+SUGGESTED = 5
+LEFT, RIGHT = 330, 320  # pixels of the panels
+TRAIN, TRAINING = "Train on the labels", "Training ..."
+
+
+class PosePage:
+    """A character to pose, and the take that it is posed for.
+
+    All that changes the pose runs in one worker. Training and suggestions, which take a second,
+    run in another, so that the sliders stay quick.
+
+    Parameters
+    ----------
+    server : ViserServer
+    rig : Rig
+        The character.
+    session : Session
+    actor : Face, optional
+        The actor's face, for a source of weights.
+    """
+
+    def __init__(
+        self, server: ViserServer, rig: Rig, session: Session, actor: Face | None = None
+    ) -> None:
+        self._server, self.session = server, session
+        self.desk = Desk(session.controls, session.known)
+        self.playback = Playback(np.zeros(1) if session.take is None else session.take.time)
+        self._seed, self._clock = 0, time.perf_counter()
+        self._drafts: dict[int, dict[int, float]] = {}  # what is pinned in frames that were left
+        self._stage = PoseStage(server, rig, session, actor)
+        self._add_sliders()
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(RIGHT)
+        self._add_take()
+        self._add_pose()
+        self._add_learning()
+        self.worker = Worker(complainer(server), self._tick)
+        self.slow = Worker(complainer(server))
+        self.seek(0)
+        self.suggest()
+
+    def stop(self) -> None:
+        """End what is under way."""
+        self.slow.stop()
+        self.worker.stop()
+
+    def seek(self, frame: int) -> None:
+        """Go to a frame, and begin with its label, or with what the model says of it."""
+        self.worker.do("seek", lambda: self._go(frame))
+
+    def pin(self, control: int, value: float) -> None:
+        """Hold a control; the others follow."""
+        self._change(("pin", control), lambda: self.desk.pin(control, value))
+
+    def let_go(self, control: int) -> None:
+        """Let a control follow."""
+        self._change(("let go", control), lambda: self.desk.let_go(control))
+
+    def save(self) -> None:
+        """Make the pose the label of the frame."""
+        self.worker.do("save", self._save)
+
+    def train(self) -> None:
+        """Learn from all labels, and show what comes of it."""
+        self._train_button.disabled, self._train_button.label = True, TRAINING
+        self.slow.do("train", self._train)
+
+    def suggest(self) -> None:
+        """List the frames that are most worth posing now."""
+        if self.session.take is not None:
+            self.slow.do("suggest", self._suggest)
+
+    def _change(self, key: object, change: Callable[[], None]) -> None:
+        """Do something to the pose and show it."""
+
+        def task() -> None:
+            change()
+            self._show()
+
+        self.worker.do(key, task)
+
+    def _go(self, frame: int) -> None:
+        if self.desk.pins:
+            self._drafts[self.playback.frame] = dict(self.desk.pins)
+        self.playback.seek(frame)
+        self._begin()
+
+    def _begin(self) -> None:
+        """With what is known of the frame, and what was pinned when it was last looked at."""
+        frame = self.playback.frame
+        if self.session.take is not None:
+            self.desk.begin(*self.session.pose(frame))
+            self.desk.pin_all(self._drafts.pop(frame, {}))
+        self._show()
+
+    def _tick(self) -> None:
+        now = time.perf_counter()
+        passed, self._clock = now - self._clock, now
+        if self.playback.advance(passed):
+            self._begin()
+
+    def _show(self) -> None:
+        frame, desk = self.playback.frame, self.desk
+        self._stage.draw(frame, desk.pose)
+        self._sliders.show(desk.pose, desk.pins)
+        self._pins.show(desk.pins)
+        self._adopt.visible, self._free.visible = False, len(desk.pins) > 1
+        if self._timeline is not None:
+            self._timeline.show(frame)
+        self._say(self._status, self._state(frame))
+
+    def _state(self, frame: int) -> str:
+        """What the pose is, in a line."""
+        desk, session = self.desk, self.session
+        if desk.far:
+            return "No known pose comes near what is pinned: the rest is a guess."
+        if desk.pins and desk.known is None:
+            return "Nothing is known of this character yet: pose three frames, and it follows."
+        if desk.pins:
+            spread = float(np.sqrt(np.mean(desk.std**2)))
+            return f"The other controls follow, ± {spread:.2f}."
+        if desk.from_neutral:
+            return "Neutral. Move a slider: it is pinned, and the others follow."
+        if session.labelled(frame):
+            return "The frame's label."
+        return "What the model says. Move what is wrong."
+
+    def _save(self) -> None:
+        frame = self.playback.frame
+        path = self.session.save(frame, self.desk.pose)
+        self.desk.learn(self.session.known)
+        self._mark()
+        self._begin()
+        self._say(self._news, f"Frame {frame} saved to {escape(path.name)}.")
+        self.suggest()
+
+    def _train(self) -> None:
+        """In the slow worker."""
+        try:
+            trained = self.session.train()
+        finally:
+            self._train_button.disabled, self._train_button.label = False, TRAIN
+        self.worker.do("trained", partial(self._trained, trained))
+        self._suggest()
+
+    def _trained(self, trained: Trained) -> None:
+        moved = "" if trained.change is None else f" Poses moved by {trained.change:.3f} (RMS)."
+        path = self.session.model_path
+        where = "" if path is None else f" {escape(path.name)} is written."
+        self.desk.learn(self.session.known)
+        if not self.desk.pins:
+            self._begin()
+        said = f"Learned from {trained.labels} labels in {trained.seconds:.1f} s.{moved}{where}"
+        self._say(self._news, said)
+
+    def _suggest(self) -> None:
+        """In the slow worker."""
+        try:
+            found = self.session.suggestion(SUGGESTED)
+        except InputError as error:  # nearly all frames are posed
+            log.debug("nothing to suggest: %s", error)
+            self.worker.do("suggested", lambda: self._places.show([]))
+            return
+        places = [
+            (frame, f"frame {frame}   stands for {share:.0%}")
+            for frame, share in zip(found.frames.tolist(), found.shares.tolist(), strict=True)
+        ]
+        self.worker.do("suggested", lambda: self._places.show(places))
+
+    def _sample(self) -> None:
+        self._seed += 1
+        poses = self.desk.samples(SAMPLES, self._seed)
+        self._samples = poses
+        self._stage.show_samples(poses)
+        self._adopt.visible = len(poses) > 0
+
+    def _mark(self) -> None:
+        take = self.session.take
+        if take is None or self._timeline is None:
+            return
+        self._timeline.mark(take.labels)
+        self._train_button.hint = f"{len(take.labels)} labels"
+
+    def _add_sliders(self) -> None:
+        panel = self._server.gui.add_panel()
+        with panel.add_tab("Controls"):
+            self._sliders = Sliders(
+                self._server, self.desk.controls.names, slider_bounds(self.desk), self.pin
+            )
+        panel.dock_left()
+        panel.set_width(LEFT)
+
+    def _add_take(self) -> None:
+        self._timeline: Timeline | None = None
+        if self.session.take is not None:
+            self._timeline = Timeline(self._server, self.session.take, self.playback, self.seek)
+            self._places = Places(self._server, "Pose next", self.seek)
+            self._places.show([])
+
+    def _add_pose(self) -> None:
+        gui = self._server.gui
+        self._status = gui.add_html("")
+        self._pins = Pins(self._server, self.desk.controls.names, self.let_go)
+        self._free = gui.add_button("Let all go", icon=Icon.PINNED_OFF, color="gray")
+        neutral = gui.add_button("Start from neutral", icon=Icon.MOOD_NEUTRAL, color="gray")
+        other = gui.add_button("Other plausible poses", icon=Icon.ARROWS_SHUFFLE, color="gray")
+        self._adopt = gui.add_button_group(
+            "take over", tuple(f"other {number}" for number in range(1, SAMPLES + 1)), visible=False
+        )
+        self._free.on_click(lambda _: self._change("let all go", self.desk.let_all_go))
+        neutral.on_click(lambda _: self._change("neutral", lambda: self.desk.begin(None)))
+        other.on_click(lambda _: self.worker.do("sample", self._sample))
+
+        @self._adopt.on_click
+        def _(_: object) -> None:
+            chosen = int(self._adopt.value.split()[-1]) - 1
+            self._change("adopt", lambda: self.desk.adopt(self._samples[chosen]))
+
+    def _add_learning(self) -> None:
+        gui = self._server.gui
+        there = self.session.take is not None
+        save = gui.add_button(
+            "Save as this frame's pose", icon=Icon.CHECK, color="green", visible=there
+        )
+        self._train_button = gui.add_button(TRAIN, icon=Icon.SCHOOL, visible=there)
+        self._news = gui.add_html("")
+        save.on_click(lambda _: self.save())
+        self._train_button.on_click(lambda _: self.train())
+        self._mark()
+
+    def _say(self, where: GuiHtmlHandle, text: str) -> None:
+        where.content = f'<div style="padding:4px 12px;font-size:13px">{text}</div>'

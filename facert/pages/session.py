@@ -1,0 +1,207 @@
+"""A recording that is being posed: its labels, the model that learns from them, and its files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from facert.data import Controls, FloatArray, Rig, Take
+from facert.errors import InputError
+from facert.io.take import write_take
+from facert.metrics import rms
+from facert.names import match
+from facert.posing.known import KnownPoses, keep
+from facert.posing.pose import LEAST
+from facert.retargeter import Retargeter
+from facert.settings import Settings
+from facert.suggestion.frames import Suggestion, suggest_frames
+from facert.training import train
+
+ENDING = ".posed.h5"
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What training came to.
+
+    Parameters
+    ----------
+    labels : int
+        How many poses it learned from.
+    seconds : float
+    change : float or None
+        RMS by which the poses of the take moved; None the first time.
+    """
+
+    labels: int
+    seconds: float
+    change: float | None
+
+
+class Session:
+    """Posing a take, frame by frame.
+
+    Parameters
+    ----------
+    controls : Controls
+        The character's.
+    take : Take, optional
+        What was recorded; its poses are the first labels, unless they were foretold by a model.
+    model : Retargeter, optional
+        Tells a pose for every frame, and what poses the character makes.
+    output : Path, optional
+        Where `save` writes the take with its labels. The model of `train` is beside it.
+
+    Raises
+    ------
+    InputError
+        When the take's controls are not the character's.
+    """
+
+    def __init__(
+        self,
+        controls: Controls,
+        take: Take | None = None,
+        model: Retargeter | None = None,
+        output: Path | None = None,
+    ) -> None:
+        self.controls, self.model, self.output = controls, model, output
+        self.saved = 0
+        self.take = None if take is None else _labels_only(take, controls)
+        self.result: Take | None = None
+        self._animation = model.poses if model is not None else None
+        if self.take is not None and model is not None:
+            self.result = model.retarget(self.take)
+
+    @property
+    def model_path(self) -> Path | None:
+        """Where `train` writes the model."""
+        return None if self.output is None else self.output.with_suffix(".safetensors")
+
+    @property
+    def known(self) -> KnownPoses | None:
+        """The poses that the character is known to make; None when they are too few."""
+        labels, animation = np.empty((0, len(self.controls.names))), self._animation
+        if self.take is not None and self.take.params is not None:
+            labels = self.take.params[self.take.labels]
+        if self.take is not None and self.take.animation is not None:
+            animation = self.take.animation
+        poses = keep(labels, animation, seed=0)
+        if len(poses) < LEAST:
+            return None
+        limits = self.controls.limits
+        spans = np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
+        return KnownPoses(poses, spans if limits is None else limits)
+
+    def pose(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
+        """A frame's label, else what the model says of it, with its standard deviation."""
+        if self.labelled(frame) and self.take is not None and self.take.params is not None:
+            return self.take.params[frame], None
+        return self._foretold(frame)
+
+    def labelled(self, frame: int) -> bool:
+        """Whether a frame has a label."""
+        return self.take is not None and frame in self.take.labels
+
+    def _foretold(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
+        if self.result is None or self.result.params is None:
+            return None, None
+        std = self.result.std
+        return self.result.params[frame], None if std is None else std[frame]
+
+    def save(self, frame: int, pose: FloatArray) -> Path:
+        """Make a pose the label of a frame, and write the take with all labels.
+
+        The file appears whole or not at all, and the label counts when it is written.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be written.
+        """
+        take, output = self._require_take()
+        known = take.params
+        params = np.full((len(take), len(self.controls.names)), np.nan)
+        if known is not None:
+            params[:] = known
+        params[frame] = pose
+        labelled = replace(take, params=params)
+        write_take(labelled, output, overwrite=True)
+        self.take, self.saved = labelled, self.saved + 1
+        return output
+
+    def suggestion(self, count: int) -> Suggestion:
+        """Frames to pose next, going on from the labels, and from the model if there is one."""
+        take, _ = self._require_take()
+        certain = self.result is not None and self.result.std is not None
+        return suggest_frames(take, count, self.model if self.model and certain else take.labels)
+
+    def train(self) -> Trained:
+        """Learn from the labels; retarget the take anew, and write the model beside it.
+
+        What the first model knew of the character's poses is kept as animation.
+
+        Raises
+        ------
+        InputError
+            When the labels are too few, or the model cannot be written.
+        """
+        take, _ = self._require_take()
+        settings = Settings() if self.model is None else self.model.settings
+        if take.animation is None and self._animation is not None:
+            take = replace(take, animation=self._animation)
+        model = train(take, replace(settings, labels=None, unlabelled=None))
+        result = model.retarget(take)
+        if self.model_path is not None:
+            model.save(self.model_path, overwrite=True)
+        change = None
+        if self.result is not None and self.result.params is not None:
+            assert result.params is not None  # it was retargeted
+            change = rms(result.params - self.result.params)
+        self.model, self.result = model, result
+        return Trained(len(take.labels), model.figures["seconds"], change)
+
+    def _require_take(self) -> tuple[Take, Path]:
+        if self.take is None or self.output is None:
+            raise InputError("--take", "a recording to pose", "none", "Give one with --take.")
+        return self.take, self.output
+
+
+def output_beside(take: Path) -> Path:
+    """Where the labels of a take go: ``performance.h5`` to ``performance.posed.h5``."""
+    if take.name.endswith(ENDING):
+        return take
+    return take.with_name(take.name.removesuffix(take.suffix) + ENDING)
+
+
+def character_controls(model: Retargeter | None, take: Take | None, rig: Rig | None) -> Controls:
+    """The controls to pose: the model's, else the take's, else the rig's shapes.
+
+    Raises
+    ------
+    InputError
+        When there is none of the three.
+    """
+    if model is not None:
+        return model.controls
+    if take is not None and take.controls is not None:
+        return take.controls
+    if rig is not None:
+        return Controls(rig.names, np.tile([0.0, 1.0], (len(rig.names), 1)))
+    expected, fix = "a model, a take with controls, or a rig", "Give --model or --rig."
+    raise InputError("the character", expected, "none", fix)
+
+
+def _labels_only(take: Take, controls: Controls) -> Take:
+    """The take with its labels and animation in the order of the controls.
+
+    Poses with a standard deviation were foretold: they are no labels.
+    """
+    if take.controls is None:
+        return replace(take, controls=controls)
+    columns = match(controls.names, take.controls.names, "/target/names")
+    params = None if take.params is None or take.std is not None else take.params[:, columns]
+    animation = None if take.animation is None else take.animation[:, columns]
+    return replace(take, controls=controls, params=params, std=None, animation=animation)

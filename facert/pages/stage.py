@@ -1,0 +1,279 @@
+"""Faces and markers beside each other, which stay so from wherever one looks.
+
+Each part stands at its place on a line across the view. As the camera goes round, the line goes
+with it, so that all parts are seen from the same side: their cameras are linked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from facert.data import BoolArray, FloatArray, IntArray, Mesh
+from facert.geometry import vertex_normals
+from facert.pages.paint import LEVELS, MOST, Paint
+from facert.view.shade import frame_mesh
+
+if TYPE_CHECKING:
+    from viser import CameraHandle, ClientHandle, ViserServer
+
+ABOVE, BELOW = np.array([240.0, 242, 244]), np.array([196.0, 201, 207])  # the backdrop
+MARKER = (31, 111, 139)
+FIELD = 0.36  # radians from top to bottom: little perspective
+HEIGHT = 1.3  # of a row
+CENTRE = np.array([0.0, -0.03, 0.0])  # of the first row
+FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+GAP = 0.08  # between two parts; each is 1 high or wide
+ASPECT = 1.2  # of the picture, width over height, until a browser tells
+APRON = 0.004  # how deep, see `Piece`
+_POINT = 0.022
+_TURNED = 1e-3  # of the line across the view: less is not worth a message
+
+
+class Part:
+    """Something on the stage, about 1 large.
+
+    Parameters
+    ----------
+    server : ViserServer
+    label : str
+    points : array, shape (n, 3)
+        Where it is, in its own units.
+    """
+
+    def __init__(self, server: ViserServer, label: str, points: FloatArray) -> None:
+        camera = frame_mesh(points)
+        self._server = server
+        self._centre, self._scale = np.array(camera.centre), 0.5 / max(camera.reach, 1e-9)
+        self.width = float(np.ptp(points[:, 0])) * self._scale
+        self.root = server.scene.add_frame(f"/{label}", show_axes=False)
+        server.scene.add_label(
+            f"/{label}/label", label, position=(0.0, -0.56, 0.0), anchor="top-center"
+        )
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is on the stage."""
+        return bool(self.root.visible)
+
+    @shown.setter
+    def shown(self, shown: bool) -> None:
+        self.root.visible = shown
+
+    def _placed(self, points: FloatArray) -> FloatArray:
+        return np.asarray((points - self._centre) * self._scale)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """The part of a mesh that has one colour, with an apron: the triangles around it.
+
+    The browser computes a vertex's normal from the piece's triangles alone: without the apron
+    there would be a seam. The apron is hidden a little below the neighbours' own triangles.
+
+    Parameters
+    ----------
+    used : array of int, shape (n,)
+        Vertices of the whole mesh.
+    own : array of bool, shape (n,)
+        Which of them the coloured triangles have; the others are the apron's.
+    faces : array of int, shape (f, 3)
+        Among `used`.
+    """
+
+    used: IntArray
+    own: BoolArray
+    faces: IntArray
+
+
+def piece_of(faces: IntArray, chosen: BoolArray) -> Piece:
+    """The piece of chosen triangles, (F,), of a mesh (F, 3)."""
+    inside = np.zeros(int(faces.max(initial=-1)) + 1, dtype=np.bool_)
+    inside[faces[chosen]] = True
+    triangles = faces[inside[faces].any(axis=1)]
+    used, compact = np.unique(triangles, return_inverse=True)
+    return Piece(used, inside[used], compact.reshape(-1, 3))
+
+
+class FacePart(Part):
+    """A mesh that moves and is painted: a mesh for each colour, as a browser's has one.
+
+    Parameters
+    ----------
+    server : ViserServer
+    label : str
+    mesh : Mesh
+        At rest.
+    own : Paint
+        Its own colours, see `facert.pages.paint.skin`; the same for all parts of one rig.
+    """
+
+    def __init__(self, server: ViserServer, label: str, mesh: Mesh, own: Paint) -> None:
+        super().__init__(server, label, mesh.vertices)
+        self._faces, self._own = mesh.faces, own
+        self._worn: Paint | None = None
+        self._pieces: list[Piece] = []
+        self._meshes = [
+            server.scene.add_mesh_simple(
+                f"/{label}/colour{index}",
+                np.zeros((3, 3)),
+                np.array([[0, 1, 2]]),
+                side="double",
+                visible=False,
+            )
+            for index in range(max(MOST, LEVELS))
+        ]
+        self.draw(mesh.vertices)
+
+    def draw(self, vertices: FloatArray, paint: Paint | None = None) -> None:
+        """The mesh with these vertices (V, 3), in its own colours or others; NaN: no pose."""
+        if not np.isfinite(vertices).all():
+            for mesh in self._meshes:
+                mesh.visible = False
+            self._worn = None
+            return
+        placed = self._placed(vertices)
+        sunk = placed - APRON * vertex_normals(placed, self._faces)
+        with self._server.atomic():
+            self._wear(paint or self._own)
+            for mesh, piece in zip(self._meshes, self._pieces, strict=False):
+                if len(piece.faces):
+                    chosen = np.where(piece.own[:, None], placed[piece.used], sunk[piece.used])
+                    mesh.vertices = chosen.astype(np.float32)
+
+    def _wear(self, paint: Paint) -> None:
+        """Sort the triangles by their colours."""
+        if self._worn is paint:
+            return
+        self._worn = paint
+        self._pieces = [piece_of(self._faces, paint.paint == k) for k in range(len(paint.palette))]
+        for index, mesh in enumerate(self._meshes):
+            there = index < len(self._pieces) and len(self._pieces[index].faces) > 0
+            mesh.visible = there
+            if there:
+                mesh.faces = self._pieces[index].faces.astype(np.uint32)
+                red, green, blue = np.rint(255 * paint.palette[index]).astype(int).tolist()
+                mesh.color = (red, green, blue)
+
+
+class MarkerPart(Part):
+    """Markers in space."""
+
+    def __init__(self, server: ViserServer, label: str, markers: FloatArray) -> None:
+        seen = markers[~np.isnan(markers).any(axis=2)]
+        super().__init__(server, label, seen)
+        self._points = server.scene.add_point_cloud(
+            f"/{label}/points",
+            np.zeros((1, 3)),
+            MARKER,
+            point_size=_POINT,
+            point_shape="circle",
+            precision="float32",
+        )
+        self.draw(markers[0])
+
+    def draw(self, markers: FloatArray) -> None:
+        """Markers (M, 3); those that are NaN are left out."""
+        there = self._placed(markers[~np.isnan(markers).any(axis=1)])
+        self._points.visible = len(there) > 0
+        if len(there):
+            self._points.points = there.astype(np.float32)
+
+
+class Stage:
+    """Where the parts stand."""
+
+    def __init__(self, server: ViserServer) -> None:
+        self._server = server
+        self._rows: list[list[Part]] = []
+        self._width, self._height, self._centre = 1.0, HEIGHT, CENTRE
+        self._right = np.array([1.0, 0.0, 0.0])
+        self._aspects: dict[int, float] = {}
+        server.scene.set_up_direction("+y")
+        server.scene.set_background_image(_backdrop(), format="png")
+        _light(server)
+        server.on_client_connect(self._link)
+
+    def add(self, part: Part, row: int = 0) -> None:
+        """Put a part to the right of the others in its row; the first row is the highest."""
+        while len(self._rows) <= row:
+            self._rows.append([])
+        self._rows[row].append(part)
+        self.arrange()
+
+    def arrange(self) -> None:
+        """Line up the parts that are shown, and let every camera see them all."""
+        self._line_up()
+        camera = self._server.initial_camera
+        camera.fov, camera.look_at = FIELD, tuple(self._centre)
+        camera.position = tuple(self._centre + self._distance(ASPECT) * FRONT)
+        for client in self._server.get_clients().values():
+            self._fit(client.camera, client.camera.position - client.camera.look_at)
+
+    def _line_up(self) -> None:
+        """Each row about the middle, the next one below it."""
+        rows = [[part for part in row if part.shown] for row in self._rows]
+        widths = [0.0]
+        with self._server.atomic():
+            for number, row in enumerate(rows):
+                ends = np.cumsum([0.0] + [part.width + GAP for part in row])
+                widths.append(float(ends[-1]) + GAP)
+                middles = (ends[:-1] + ends[1:] - ends[-1]) / 2.0
+                for part, middle in zip(row, middles, strict=True):
+                    part.root.position = tuple(middle * self._right - number * HEIGHT * UP)
+        filled = sum(bool(row) for row in rows)
+        self._width, self._height = max(widths), max(filled, 1) * HEIGHT
+        self._centre = CENTRE - (self._height - HEIGHT) / 2.0 * UP
+
+    def _distance(self, aspect: float) -> float:
+        """From where a camera sees all rows."""
+        return max(self._height, self._width / aspect) / 2.0 / float(np.tan(FIELD / 2.0))
+
+    def _fit(self, camera: CameraHandle, side: FloatArray) -> None:
+        """Let a camera see all rows from one side."""
+        direction = side / max(float(np.linalg.norm(side)), 1e-9)
+        camera.position = self._centre + self._distance(camera.aspect) * direction
+        camera.look_at = self._centre
+
+    def _link(self, client: ClientHandle) -> None:
+        client.camera.on_update(self._follow)
+
+    def _follow(self, camera: CameraHandle) -> None:
+        """Turn the line with the camera, about the vertical."""
+        w, x, y, z = camera.wxyz
+        right = np.array([1 - 2 * (y * y + z * z), 0.0, 2 * (x * z - w * y)])
+        length = float(np.linalg.norm(right))
+        visitor, aspect = camera.client.client_id, self._aspects.get(camera.client.client_id)
+        if aspect is None or abs(aspect - camera.aspect) > 0.01:  # new, or a window of another size
+            self._aspects[visitor] = camera.aspect
+            self._fit(camera, FRONT if aspect is None else camera.position - camera.look_at)
+            return
+        if length > 0.1 and np.abs(right / length - self._right).max() > _TURNED:
+            self._right = right / length
+            self._line_up()
+
+
+def _light(server: ViserServer) -> None:
+    """A warm key from the upper left, cool sky, and a rim: as in `facert.view.shade`."""
+    scene = server.scene
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere(
+        "/lights/sky", sky_color=(214, 226, 246), ground_color=(120, 104, 96), intensity=1.1
+    )
+    scene.add_light_directional(
+        "/lights/key", color=(255, 244, 230), intensity=2.0, position=(-4.2, 5.2, 7.4)
+    )
+    scene.add_light_directional(
+        "/lights/rim", color=(200, 218, 255), intensity=0.9, position=(6.0, 2.0, -4.0)
+    )
+
+
+def _backdrop() -> np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]:
+    """A grey that darkens downwards, (256, 2, 3)."""
+    share = np.linspace(0.0, 1.0, 256)[:, None, None]
+    return np.broadcast_to(np.rint((1 - share) * ABOVE + share * BELOW), (256, 2, 3)).astype(
+        np.uint8
+    )

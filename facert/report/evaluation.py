@@ -1,0 +1,177 @@
+"""A section from what `facert eval --json` wrote."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+import numpy as np
+
+from facert.errors import InputError, reading
+from facert.evaluation.figures import INK, plot_errors
+from facert.evaluation.summary import Row, best
+from facert.io.text import existing_file, read_text
+from facert.report.pictures import embedded
+from facert.report.sections import Fact, Picture, Section, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MAX_BYTES = 2**26
+MAX_ROWS = 20_000
+MOST_CONTROLS = 80  # that a picture names
+TOLD = ("take", "target", "across", "rig", "split", "noise", "missing", "seed", "repeats")
+
+Column = Callable[[Row], str]
+
+
+def read_evaluation(path: Path) -> Section:
+    """Read the figures of an evaluation.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, too large, or not what ``facert eval --json`` writes.
+    """
+    with reading(path):
+        size = existing_file(path).stat().st_size
+        if size > MAX_BYTES:
+            raise _unexpected("file", f"at most {MAX_BYTES} bytes", f"{size}")
+        try:
+            content = json.loads(read_text(path))
+        except (ValueError, RecursionError) as error:
+            raise _unexpected("file", "JSON", str(error)) from None
+        return _section(path.name, *_checked(content))
+
+
+def _section(name: str, settings: Mapping[str, Any], rows: list[Row]) -> Section:
+    drawn = [row for row in rows if row.rms is not None]
+    pictures: list[Picture] = []
+    if drawn:
+        pictures.append(embedded(plot_errors(drawn), "Error of each method", "svg"))
+        controls = [str(control) for control in _sequence(settings.get("controls"))]
+        most = max(row.labels for row in drawn)
+        picture = _per_control([row for row in drawn if row.labels == most], controls)
+        if picture is not None:
+            caption = f"RMS of each control, with {most} labels"
+            pictures.append(embedded(picture, caption, "svg"))
+    told = [Fact(key, _told(settings[key])) for key in TOLD if settings.get(key) not in (None, "")]
+    versions = settings.get("versions")
+    if isinstance(versions, Mapping):
+        told += [Fact(str(key), _told(value)) for key, value in versions.items()]
+    failures = sorted({f"{row.method}: {row.failure}" for row in rows if row.failure})
+    return Section(
+        f"Evaluation: {name}", " ".join(failures), tuple(pictures), _tables(rows), tuple(told)
+    )
+
+
+def _tables(rows: Sequence[Row]) -> tuple[Table, ...]:
+    """One for each number of labels and of unlabelled data, the best method marked."""
+    columns = {name: show for name, show in _COLUMNS.items() if any(show(row) for row in rows)}
+    tables = []
+    for (labels, unlabelled), members in groupby(rows, lambda row: (row.labels, row.unlabelled)):
+        section = list(members)
+        least = best(section)
+        cells = tuple(tuple(show(row) for show in columns.values()) for row in section)
+        chosen = frozenset(index for index, row in enumerate(section) if row is least)
+        caption = f"{labels} labels, {unlabelled} unlabelled frames and poses"
+        tables.append(Table(caption, tuple(columns), cells, chosen))
+    return tuple(tables)
+
+
+def _number(value: float | None, form: str = ".4f") -> str:
+    return "" if value is None else f"{value:{form}}"
+
+
+_COLUMNS: dict[str, Column] = {
+    "method": lambda row: row.method,
+    "RMS": lambda row: _number(row.rms),
+    "± s.e.": lambda row: _number(row.rms_se),
+    "/ best": lambda row: _number(row.ratio_to_best, ".2f"),
+    "of range": lambda row: _number(row.rms_normalised, ".1%"),
+    "jitter": lambda row: _number(row.jitter),
+    "vertex": lambda row: _number(row.vertex_rms),
+    "vertex, 95 %": lambda row: _number(row.vertex_p95),
+    "fit, s": lambda row: _number(row.fit_seconds, ".2f"),
+    "ms a frame": lambda row: _number(row.frame_ms, ".3f"),
+    "draws": lambda row: f"{row.repeats}",
+}
+
+
+def _per_control(rows: Sequence[Row], controls: Sequence[str]) -> Figure | None:
+    """Colours for the RMS of each method and control."""
+    from matplotlib.figure import Figure
+
+    rows = [row for row in rows if len(row.per_control) == len(controls)]
+    if not rows or not 1 < len(controls) <= MOST_CONTROLS:
+        return None
+    methods = list(dict.fromkeys(row.method for row in rows))
+    errors = [
+        np.mean([row.per_control for row in rows if row.method == method], axis=0)
+        for method in methods
+    ]
+    size = (1.8 + 0.17 * len(controls), 1.7 + 0.24 * len(methods))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(np.array(errors), cmap="YlOrRd", vmin=0.0, aspect="auto")
+    axes.set_xticks(range(len(controls)), controls, rotation=90, fontsize=7, color=INK)
+    axes.set_yticks(range(len(methods)), methods, fontsize=8, color=INK)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(length=0)
+    figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01).ax.tick_params(labelsize=7)
+    return figure
+
+
+def _checked(content: object) -> tuple[Mapping[str, Any], list[Row]]:
+    """The settings and rows of a file that may hold anything."""
+    if not isinstance(content, dict) or not isinstance(content.get("settings"), dict):
+        raise _unexpected("file", "settings and rows", "something else")
+    entries = content.get("rows")
+    if not isinstance(entries, list) or not 0 < len(entries) <= MAX_ROWS:
+        raise _unexpected("rows", f"1 to {MAX_ROWS} of them", "none, more, or no list")
+    return content["settings"], [_row(index, entry) for index, entry in enumerate(entries)]
+
+
+def _row(index: int, entry: object) -> Row:
+    """A row whose values have the types that they should."""
+    hints = get_type_hints(Row)
+    values: dict[str, Any] = {}
+    for field in fields(Row):
+        where = f"rows/{index}/{field.name}"
+        value = entry.get(field.name, field.default) if isinstance(entry, dict) else MISSING
+        if field.name == "per_control":
+            value = tuple(_sequence(value))
+            good = all(_fits(part, float) for part in value)
+        else:
+            good = _fits(value, hints[field.name])
+        if not good:
+            raise _unexpected(where, "a finite number, or text", repr(value))
+        values[field.name] = value
+    return Row(**values)
+
+
+def _fits(value: object, hint: Any) -> bool:
+    if hint is str:
+        return isinstance(value, str)
+    if value is None:
+        return bool(hint == float | None)
+    if isinstance(value, bool) or not isinstance(value, int if hint is int else (int, float)):
+        return False
+    return math.isfinite(value)
+
+
+def _sequence(value: object) -> Sequence[Any]:
+    return value if isinstance(value, (list, tuple)) else ()
+
+
+def _told(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _unexpected(field: str, expected: str, found: str) -> InputError:
+    return InputError(field, expected, found, "Give what facert eval --json wrote.")

@@ -1,0 +1,47 @@
+"""A report as HTML that needs nothing but itself: no network, no script, no other file."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, StrictUndefined, Template
+
+from facert.io.atomic import replacing
+from facert.report.sections import Fact, Report, Section
+
+LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
+
+
+def make_report(title: str, sections: tuple[Section, ...]) -> Report:
+    """A report that says what made it."""
+    return Report(title, sections, tuple(Fact(name, version(name)) for name in LIBRARIES))
+
+
+def to_html(report: Report) -> str:
+    """The page; the same report gives the same text. All that came from files is escaped."""
+    return _template().render(report=report)
+
+
+def write_report(report: Report, path: Path, overwrite: bool = False) -> None:
+    """Write the page.
+
+    Raises
+    ------
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    text = to_html(report)
+    with replacing(path, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+@cache
+def _template() -> Template:
+    text = files("facert.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.from_string(text)

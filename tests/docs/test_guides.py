@@ -1,0 +1,89 @@
+"""A reader who does what the guides say gets what they show."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from following import DOCS, ROOT, blocks_of, check_options, follow, stand_in, unknown_options
+
+import facert
+from facert.demo.character import animate
+
+PAGES = sorted(DOCS.glob("*.md"))
+ON_THEIR_OWN = {
+    "phone-to-blender.md": "phone-demo/shot.h5",
+    "optical-markers.md": "optical-demo/result.h5",
+}
+GOING_ON = ["posing.md", "key-frames.md", "live.md", "batch.md"]
+LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#([\w-]+))?\)")
+
+
+@pytest.mark.slow
+def test_the_quick_start_works_as_printed(quick_start: Path) -> None:
+    made = {path.name for path in quick_start.iterdir()}
+    assert {"model.safetensors", "result.h5", "result.csv", "faces.png"} <= made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ON_THEIR_OWN)
+def test_a_guide_works_as_printed_and_leads_to_the_true_poses(name: str, tmp_path: Path) -> None:
+    follow(DOCS / name, tmp_path)
+    found = facert.read_take(tmp_path / ON_THEIR_OWN[name]).params
+    truth = animate(stand_in()["performed"]("shot"))
+    still = truth - truth.mean(axis=0)
+    assert np.sqrt(np.mean((found - truth) ** 2)) < 0.65 * np.sqrt(np.mean(still**2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", GOING_ON)
+def test_a_guide_goes_on_from_the_quick_start(name: str, quick_start: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(quick_start, tmp_path / "copy")
+    follow(DOCS / name, folder)
+    assert "(quick-start.md)" in (DOCS / name).read_text(encoding="utf-8")
+
+
+def test_every_page_with_commands_is_followed() -> None:
+    commanding = {page.name for page in PAGES if any(not b.language for b in blocks_of(page))}
+    assert commanding == {"quick-start.md", *ON_THEIR_OWN, *GOING_ON}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_that_wait_for_ctrl_c_have_options_that_exist(page: Path) -> None:
+    for block in blocks_of(page):
+        if block.language == "sh":
+            for command in block.commands:
+                check_options(command)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_within_the_text_exist_with_their_options(page: Path) -> None:
+    for command in re.findall(r"`(facert [^`]+)`", page.read_text(encoding="utf-8")):
+        assert not unknown_options(command), command
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target, _, place in LINK.findall(page.read_text(encoding="utf-8")):
+        there = page.parent / target if target else page
+        assert there.exists(), target
+        assert not place or place in places_of(there), f"{target}#{place}"
+
+
+def places_of(page: Path) -> list[str]:
+    """What GitHub calls the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (DOCS / "README.md").read_text(encoding="utf-8")
+    assert [page.name for page in PAGES if f"({page.name})" not in index] == ["README.md"]
+
+
+def test_no_page_names_a_place_of_this_machine() -> None:
+    for path in [*PAGES, DOCS / "stand_in.py"]:
+        assert str(ROOT) not in path.read_text(encoding="utf-8")

@@ -1,0 +1,154 @@
+"""The scripts for other programs read what facert writes, without facert."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from facert.data import Source, Take
+from facert.importers import PROGRAMS, script
+from facert.importers.curves import find, keys, read_curves, spelling
+from facert.io.curves import write_curves
+from facert.io.formats import write_take_file
+from facert.names import ARKIT_SHAPES
+
+VALUES = np.array([[0.1, 0.5], [np.nan, 0.5], [0.3, 0.5]])
+TAKE = Take([0.5, 0.54, 0.58], Source(VALUES, ("jawOpen", "eyeBlink_L")), fps=25.0)
+
+
+@pytest.mark.parametrize("ending", ["json", "csv"])
+def test_curves_are_read_as_they_were_written(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"curves.{ending}"
+    write_take_file(TAKE, path)
+    curves = read_curves(str(path))
+    assert curves.values == {"jawOpen": [0.1, None, 0.3], "eyeBlink_L": [0.5, 0.5, 0.5]}
+    assert curves.fps == pytest.approx(25.0)
+    np.testing.assert_allclose(curves.time, TAKE.time)
+
+
+def test_what_is_not_known_gets_no_key_and_a_constant_curve_one(tmp_path: Path) -> None:
+    write_curves(TAKE, tmp_path / "curves.json")
+    curves = read_curves(str(tmp_path / "curves.json"))
+    assert keys(curves, "jawOpen") == [(0.5, 0.1), (0.58, 0.3)]
+    assert keys(curves, "eyeBlink_L") == [(0.5, 0.5)]
+
+
+@pytest.mark.parametrize("name", ["eyeBlinkLeft", "EyeBlink_L", "eye_blink.l", "eyeBlinkL"])
+def test_spellings_of_a_name_are_one(name: str) -> None:
+    assert spelling(name) == "eyeblinkleft"
+    assert find(name, ["jawOpen", "EyeBlinkLeft", "eyeBlinkRight"]) == "EyeBlinkLeft"
+
+
+def test_names_that_are_different_stay_so() -> None:
+    assert len({spelling(name) for name in ARKIT_SHAPES}) == len(ARKIT_SHAPES)
+    assert find("brow", ["browUp"]) is None
+    assert find("a_b", ["ab", "a-b"]) is None  # either could be meant
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_script_needs_no_facert(program: str) -> None:
+    text = script(program)
+    compile(text, program, "exec")
+    assert "import facert" not in text
+    assert "from facert" not in text
+    assert text.startswith('"""Keys the ')
+
+
+# What the scripts ask of Maya and Blender, in Python alone: it keeps what is keyed.
+MAYA = """
+import sys, types
+class cmds:
+    keyed = []
+    objExists = staticmethod(lambda node: node == "face")
+    listAttr = staticmethod(lambda node, keyable, multi: ["JawOpen", "eyeBlinkLeft", "smile"])
+    warning = staticmethod(print)
+    @classmethod
+    def setKeyframe(cls, node, **key):
+        cls.keyed.append((node, key["attribute"], key["time"], key["value"]))
+maya = types.ModuleType("maya"); maya.cmds = cmds
+sys.modules.update({"maya": maya, "maya.cmds": cmds})
+"""
+BLENDER = """
+import sys, types
+N = types.SimpleNamespace
+class Points(list):
+    def add(self, count): self += [N() for _ in range(count)]
+    def foreach_set(self, name, flat):
+        for point, co in zip(self, zip(flat[::2], flat[1::2])): point.co = co
+class Curves(dict):
+    def find(self, path): return self.get(path)
+class Block:
+    slider_min, slider_max, value = 0.0, 1.0, 0.0
+    def __init__(self, name): self.name = name
+    def path_from_id(self, path): return f'key_blocks["{self.name}"].{path}'
+    def keyframe_insert(self, path, frame):
+        new = N(keyframe_points=Points([N(co=(frame, self.value))]), update=lambda: None)
+        curves.setdefault(self.path_from_id(path), new)
+curves = Curves()
+blocks = {name: Block(name) for name in ("Basis", "jawopen", "eyeBlink.L", "smile")}
+action = N(fcurves=curves)
+if MODERN: action = N(layers=[N(strips=[N(channelbag={"slot": N(fcurves=curves)}.get)])])
+shapes = N(key_blocks=blocks, animation_data=N(action=action, action_slot="slot"))
+face = N(data=N(shape_keys=shapes))
+bpy = types.ModuleType("bpy")
+bpy.data = N(objects={"Face": face})
+bpy.context = N(active_object=face, scene=N(render=N(fps=50, fps_base=1.0)))
+sys.modules["bpy"] = bpy
+"""
+
+
+def run(folder: Path, *parts: str) -> str:
+    """What a Python that knows nothing of facert prints."""
+    (folder / "script.py").write_text("\n".join(parts))
+    command = [sys.executable, "-I", "-S", "script.py"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(name="folder")
+def _folder(tmp_path: Path) -> Path:
+    named = Source(np.c_[VALUES, [2.0, 0, -1]], ("jawOpen", "eyeBlink_L", "other.smile"))
+    write_curves(replace(TAKE, source=named), tmp_path / "curves.json")
+    return tmp_path
+
+
+def without_future(program: str) -> str:
+    return script(program).replace("from __future__ import annotations", "")
+
+
+def test_maya_keys_attributes_by_time(folder: Path) -> None:
+    call = 'key_attributes("curves.json", "face"); print(cmds.keyed)'
+    said = run(folder, "from __future__ import annotations", MAYA, without_future("maya"), call)
+    keyed: list[Any] = eval(said.splitlines()[-1])
+    assert keyed == [
+        ("face", "JawOpen", "0.000000sec", 0.1),
+        ("face", "JawOpen", "0.080000sec", 0.3),
+        ("face", "eyeBlinkLeft", "0.000000sec", 0.5),
+    ]
+    assert "no attribute for 'other.smile'" in said
+
+
+@pytest.mark.parametrize("modern", [True, False])
+def test_blender_keys_shapes_by_time_at_the_rate_of_its_scene(folder: Path, modern: bool) -> None:
+    call = """key_shapes("curves.json", "Face")
+print({path: [point.co for point in one.keyframe_points] for path, one in curves.items()})"""
+    said = run(
+        folder,
+        "from __future__ import annotations",
+        f"MODERN = {modern}",
+        BLENDER,
+        without_future("blender"),
+        call,
+    )
+    keyed: dict[str, list[Any]] = eval(said.splitlines()[-1])
+    assert list(keyed) == ['key_blocks["jawopen"].value', 'key_blocks["eyeBlink.L"].value']
+    (first, last), (constant,) = keyed.values()
+    np.testing.assert_allclose(first, (1, 0.1))
+    np.testing.assert_allclose(last, (5, 0.3))
+    np.testing.assert_allclose(constant, (1, 0.5))
+    assert "no shape key for 'other.smile'" in said

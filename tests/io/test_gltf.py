@@ -1,0 +1,414 @@
+"""Rigs and animations come out of glTF files of other programs; hostile files do no harm."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygltflib as gltf
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facert.data import Rig
+from facert.errors import InputError
+from facert.io.glb import write_glb
+from facert.io.gltf import open_gltf
+from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
+from facert.io.gltf_take import holds_animation, read_gltf_take
+from facert.io.livelink import read_livelink
+from facert.io.mesh import read_mesh
+from facert.io.npz import read_npz_rig
+from facert.labelling import weights_as_poses
+from facert.morphs import rig_morphs
+from facert.view.faces import control_settings
+
+BLENDER = Path(__file__).parent / "files" / "blender.glb"  # made and exported in Blender 5.0
+TRIANGLE = np.eye(3, dtype=np.float32)
+SMILE, BLINK = np.float32([[0, 1, 0]] * 3), np.float32([[0, 0, 2]] * 3)
+RNG = np.random.default_rng(0)
+FACE = Rig(
+    RNG.normal(size=(20, 3)),
+    RNG.normal(size=(3, 20, 3)),
+    ("jawOpen", "mouthSmile_L", "brow"),
+    RNG.integers(0, 20, (9, 3)),
+    "cm",
+    RNG.random((20, 3)),
+)
+WEIGHTS = RNG.random((7, 3))
+TIME = np.arange(7) / 25
+
+
+class Builder:
+    """A document in the making, by pygltflib: one node with one mesh a call."""
+
+    def __init__(self) -> None:
+        self.document = gltf.GLTF2(scene=0, scenes=[gltf.Scene(nodes=[])])
+        self.content = b""
+
+    def view(self, array: np.ndarray, stride: int | None = None) -> int:
+        content = array.tobytes()
+        place = gltf.BufferView(
+            buffer=0, byteOffset=len(self.content), byteLength=len(content), byteStride=stride
+        )
+        self.document.bufferViews.append(place)
+        self.content += content + b"\0" * (-len(content) % 4)
+        return len(self.document.bufferViews) - 1
+
+    def accessor(self, array: np.ndarray, **others: Any) -> int:
+        codes = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121, "i2": 5122}
+        one = gltf.Accessor(
+            componentType=codes[array.dtype.str[1:]],
+            count=len(array),
+            type={1: "SCALAR", 3: "VEC3"}[1 if array.ndim == 1 else array.shape[1]],
+            **({"bufferView": self.view(array)} | others),
+        )
+        self.document.accessors.append(one)
+        return len(self.document.accessors) - 1
+
+    def mesh(self, vertices: np.ndarray, targets: dict[str, np.ndarray | int], **node: Any) -> None:
+        given = [one if isinstance(one, int) else self.accessor(one) for one in targets.values()]
+        primitive = gltf.Primitive(
+            attributes=gltf.Attributes(POSITION=self.accessor(vertices)),
+            targets=[{"POSITION": one} for one in given],
+        )
+        self.document.meshes.append(
+            gltf.Mesh(primitives=[primitive], extras={"targetNames": list(targets)})
+        )
+        self.document.nodes.append(gltf.Node(mesh=len(self.document.meshes) - 1, **node))
+        self.document.scenes[0].nodes.append(len(self.document.nodes) - 1)
+
+    def animate(
+        self, time: np.ndarray, output: np.ndarray, interpolation: str = "LINEAR", node: int = 0
+    ) -> None:
+        sampler = gltf.AnimationSampler(
+            input=self.accessor(np.float32(time)),
+            output=self.accessor(np.float32(output).ravel()),
+            interpolation=interpolation,
+        )
+        target = gltf.AnimationChannelTarget(node=node, path="weights")
+        channel = gltf.AnimationChannel(sampler=0, target=target)
+        self.document.animations.append(gltf.Animation(samplers=[sampler], channels=[channel]))
+
+    def save(self, path: Path) -> Path:
+        self.document.buffers = [gltf.Buffer(byteLength=len(self.content))]
+        self.document.set_binary_blob(self.content)
+        self.document.save(str(path))
+        return path
+
+
+@pytest.fixture(name="builder")
+def _builder() -> Builder:
+    builder = Builder()
+    builder.mesh(TRIANGLE, {"smile": SMILE, "blink": BLINK})
+    return builder
+
+
+def test_a_face_of_blender_is_a_rig_where_its_scene_places_it() -> None:
+    rig = read_gltf_rig(BLENDER)
+    assert rig.names == ("smile", "blink")
+    assert rig.units == "m"
+    np.testing.assert_allclose(rig.neutral.max(axis=0), [2, 5, 0])
+    moved = np.abs(rig.shapes[0]).max(axis=1) > 0
+    np.testing.assert_allclose(rig.shapes[0][moved], [[0, 0.5, 1]])
+    np.testing.assert_allclose(rig.neutral[moved], [[0, 5, 0]])
+
+
+def test_vertices_that_an_exporter_cut_in_several_are_one_again() -> None:
+    rig = read_gltf_rig(BLENDER)  # Blender's mesh has five vertices, its export seven
+    assert rig.neutral.shape == (5, 3)
+    assert len(np.unique(rig.faces)) == 5
+    np.testing.assert_array_equal(read_gltf_mesh(BLENDER).vertices, rig.neutral)
+
+
+def test_a_mesh_without_targets_can_be_read_at_rest(tmp_path: Path) -> None:
+    builder = Builder()
+    builder.mesh(TRIANGLE, {}, translation=[1, 0, 0])
+    path = builder.save(tmp_path / "still.glb")
+    np.testing.assert_array_equal(read_gltf_mesh(path).vertices, TRIANGLE + np.float32([1, 0, 0]))
+    with pytest.raises(InputError, match="morph targets"):
+        read_gltf_rig(path)
+    assert read_mesh(path).units == "m"
+
+
+def test_an_animation_of_blender_is_a_take_of_weights() -> None:
+    take = read_gltf_take(BLENDER)
+    assert take.source.names == ("smile", "blink")
+    assert take.fps == 25.0
+    np.testing.assert_allclose(take.time, np.arange(1, 12) / 25, atol=1e-7)
+    np.testing.assert_allclose(take.source.values[[0, 5, 10]], [[0, 1], [1, 0], [0.5, 0.5]])
+
+
+def test_what_facert_writes_it_reads(tmp_path: Path) -> None:
+    write_glb(rig_morphs(FACE, WEIGHTS, TIME), tmp_path / "face.glb")
+    rig, take = read_gltf_rig(tmp_path / "face.glb"), read_gltf_take(tmp_path / "face.glb")
+    np.testing.assert_allclose(rig.neutral, FACE.neutral / 100, atol=1e-7)
+    np.testing.assert_allclose(rig.shapes, FACE.shapes / 100, atol=1e-7)
+    np.testing.assert_allclose(rig.colours, FACE.colours, atol=1e-6)
+    np.testing.assert_array_equal(rig.faces, FACE.faces)
+    assert rig.names == take.source.names == FACE.names
+    np.testing.assert_array_equal(take.source.values, WEIGHTS.astype(np.float32))
+    np.testing.assert_allclose(take.time, TIME, atol=1e-7)
+
+
+def test_writing_what_was_read_gives_the_same_arrays_again(tmp_path: Path) -> None:
+    write_glb(rig_morphs(FACE, WEIGHTS, TIME), tmp_path / "0.glb")
+    for number in (1, 2):
+        rig, take = (
+            read(tmp_path / f"{number - 1}.glb") for read in (read_gltf_rig, read_gltf_take)
+        )
+        write_glb(rig_morphs(rig, take.source.values, take.time), tmp_path / f"{number}.glb")
+    again = read_gltf_rig(tmp_path / "2.glb")
+    np.testing.assert_array_equal(again.neutral, rig.neutral.astype(np.float32))
+    np.testing.assert_array_equal(again.shapes, rig.shapes.astype(np.float32))
+
+
+@pytest.mark.real
+def test_a_recorded_performance_plays_the_same_after_a_round_trip(
+    real_data: Path, tmp_path: Path
+) -> None:
+    rig = read_npz_rig(real_data / "rigs" / "makehuman_head.npz", "arkit")
+    take = weights_as_poses(read_livelink(real_data / "recordings" / "utterance_b.csv"), rig)
+    params = control_settings(take, rig, range(len(take)))
+    write_glb(rig_morphs(rig, params, take.time), tmp_path / "face.glb")
+    back, played = read_gltf_rig(tmp_path / "face.glb"), read_gltf_take(tmp_path / "face.glb")
+    frames = np.searchsorted(played.time, take.time - 1e-3)[::97]  # pauses are filled
+    vertices = back.deform(played.source.values[frames])
+    np.testing.assert_allclose(vertices, rig.deform(params[::97]), atol=1e-5)
+
+
+def test_another_library_finds_the_names_that_facert_wrote(tmp_path: Path) -> None:
+    write_glb(rig_morphs(FACE, WEIGHTS, TIME), tmp_path / "face.glb")
+    document = gltf.GLTF2().load(str(tmp_path / "face.glb"))
+    assert tuple(document.meshes[0].extras["targetNames"]) == FACE.names
+    assert document.animations[0].channels[0].target.path == "weights"
+
+
+def test_meshes_with_targets_of_one_name_are_one_rig(builder: Builder, tmp_path: Path) -> None:
+    quarter = [0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)]  # about z
+    builder.mesh(TRIANGLE, {"blink": SMILE}, translation=[1, 0, 0], rotation=quarter)
+    builder.mesh(TRIANGLE, {})
+    rig = read_gltf_rig(builder.save(tmp_path / "two.glb"))
+    assert rig.names == ("smile", "blink")
+    assert rig.neutral.shape == (6, 3)
+    np.testing.assert_allclose(rig.neutral[3:], [[1, 1, 0], [0, 0, 0], [1, 0, 1]], atol=1e-6)
+    np.testing.assert_allclose(rig.shapes[1], [[0, 0, 2]] * 3 + [[-1, 0, 0]] * 3, atol=1e-6)
+    np.testing.assert_array_equal(rig.shapes[0, 3:], 0)
+    np.testing.assert_array_equal(rig.faces, [[0, 1, 2], [3, 4, 5]])
+
+
+def test_a_sparse_target_moves_only_some_vertices(tmp_path: Path) -> None:
+    builder = Builder()
+    places = builder.view(np.uint8([2, 0, 0, 0]))
+    moves = builder.view(np.float32([[0, 0, 5]]))
+    sparse = gltf.Sparse(
+        count=1,
+        indices=gltf.AccessorSparseIndices(bufferView=places, componentType=5121),
+        values=gltf.AccessorSparseValues(bufferView=moves),
+    )
+    number = builder.accessor(np.zeros((3, 3), np.float32), bufferView=None, sparse=sparse)
+    builder.mesh(TRIANGLE, {"lift": number})
+    rig = read_gltf_rig(builder.save(tmp_path / "sparse.glb"))
+    np.testing.assert_array_equal(rig.shapes[0], [[0, 0, 0], [0, 0, 0], [0, 0, 5]])
+
+
+def test_normalised_and_interleaved_numbers_are_read(tmp_path: Path) -> None:
+    builder = Builder()
+    pairs = np.int16([[32767, 0, -32767, 9], [0, 32767, 0, 9], [0, 0, 32767, 9]])
+    view = builder.view(pairs, stride=8)
+    number = builder.accessor(pairs[:, :3].copy(), bufferView=view, normalized=True)
+    builder.mesh(TRIANGLE, {"move": number})
+    rig = read_gltf_rig(builder.save(tmp_path / "packed.glb"))
+    np.testing.assert_allclose(rig.shapes[0], [[1, 0, -1], [0, 1, 0], [0, 0, 1]])
+
+
+def test_a_document_with_its_buffer_beside_it_or_inside(builder: Builder, tmp_path: Path) -> None:
+    wanted = read_gltf_rig(builder.save(tmp_path / "face.glb"))
+    root = json.loads(gltf.GLTF2().load(str(tmp_path / "face.glb")).to_json())
+    (tmp_path / "my face.bin").write_bytes(builder.content)
+    inside = f"data:application/octet-stream;base64,{base64.b64encode(builder.content).decode()}"
+    for uri in ("my%20face.bin", inside):
+        root["buffers"][0]["uri"] = uri
+        (tmp_path / "face.gltf").write_text(json.dumps(root))
+        np.testing.assert_array_equal(read_gltf_rig(tmp_path / "face.gltf").shapes, wanted.shapes)
+    root["buffers"][0]["uri"] = "lost.bin"
+    (tmp_path / "face.gltf").write_text(json.dumps(root))
+    with pytest.raises(InputError, match=r"lost\.bin: file: expected an existing file"):
+        read_gltf_rig(tmp_path / "face.gltf")
+
+
+KEYS = np.array([[0.0, 0.0], [1.0, 0.5], [0.5, 1.0]])
+
+
+def test_keys_far_apart_are_sampled_as_they_are_interpolated(
+    builder: Builder, tmp_path: Path
+) -> None:
+    builder.animate([0.0, 0.1, 0.5], KEYS)
+    take = read_gltf_take(builder.save(tmp_path / "a.glb"))
+    assert take.fps == 10.0
+    wanted = [[0, 0], [1, 0.5], [0.875, 0.625], [0.75, 0.75], [0.625, 0.875], [0.5, 1]]
+    np.testing.assert_allclose(take.source.values, wanted, atol=1e-6)
+
+
+def test_steps_stay_and_cubic_splines_pass_through_their_values(tmp_path: Path) -> None:
+    step, cubic = Builder(), Builder()
+    for one in (step, cubic):
+        one.mesh(TRIANGLE, {"smile": SMILE, "blink": BLINK})
+    step.animate([0.0, 0.1, 0.5], KEYS, "STEP")
+    stepped = read_gltf_take(step.save(tmp_path / "step.glb")).source.values
+    np.testing.assert_array_equal(stepped, KEYS[[0, 1, 1, 1, 1, 2]])
+    slopes = np.array([[2.0, 1.0]] * 3)
+    cubic.animate([0.0, 0.1, 0.5], np.stack([slopes, KEYS, slopes], axis=1), "CUBICSPLINE")
+    curve = read_gltf_take(cubic.save(tmp_path / "cubic.glb")).source.values
+    np.testing.assert_allclose(curve[[0, 1, 5]], KEYS, atol=1e-6)
+    middle = (KEYS[1] + KEYS[2]) / 2 + 0.4 / 8 * (slopes[1] - slopes[2])
+    np.testing.assert_allclose(curve[3], middle, atol=1e-6)
+
+
+def test_of_several_animations_one_must_be_chosen(builder: Builder, tmp_path: Path) -> None:
+    for name, value in (("talk", 0.25), ("shout", 0.75)):
+        builder.animate([0.0, 0.5], np.full((2, 2), value))
+        builder.document.animations[-1].name = name
+    path = builder.save(tmp_path / "two.glb")
+    with pytest.raises(InputError, match="one of: talk, shout"):
+        read_gltf_take(path)
+    with pytest.raises(InputError, match="found 'sing'"):
+        read_gltf_take(path, "sing")
+    assert read_gltf_take(path, "shout").source.values.max() == 0.75
+
+
+def test_a_rig_without_an_animation_holds_no_take(builder: Builder, tmp_path: Path) -> None:
+    path = builder.save(tmp_path / "still.glb")
+    assert not holds_animation(path)
+    with pytest.raises(InputError, match="an animation of morph targets"):
+        read_gltf_take(path)
+
+
+def test_targets_without_names_are_numbered(builder: Builder, tmp_path: Path) -> None:
+    builder.document.meshes[0].extras = {}
+    assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == ("target1", "target2")
+
+
+def glb(root: dict[str, Any], content: bytes) -> bytes:
+    text = json.dumps(root).encode()
+    text += b" " * (-len(text) % 4)
+    total = 28 + len(text) + len(content)
+    return (
+        struct.pack("<III", 0x46546C67, 2, total)
+        + struct.pack("<II", len(text), 0x4E4F534A) + text
+        + struct.pack("<II", len(content), 0x004E4942) + content
+    )  # fmt: skip
+
+
+def rewritten(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    """The file of Blender with its JSON changed."""
+    with open_gltf(BLENDER) as document:
+        root = json.loads(json.dumps(document.root))
+        change(root)
+        path.write_bytes(glb(root, document.buffers[0]))
+
+
+def at(*keys: Any) -> Callable[[Any], Callable[[dict[str, Any]], None]]:
+    """Sets what stands at a place of the JSON."""
+
+    def to(value: Any) -> Callable[[dict[str, Any]], None]:
+        def change(root: Any) -> None:
+            for key in keys[:-1]:
+                root = root[key]
+            root[keys[-1]] = value
+
+        return change
+
+    return to
+
+
+HOSTILE = {
+    "a count beyond the bytes": at("accessors", 0, "count")(10**6),
+    "a count beyond all memory": at("accessors", 0, "count")(10**15),
+    "a count beyond all memory and no bytes": at("accessors", 0)(
+        {"componentType": 5126, "count": 10**12, "type": "VEC3"}
+    ),
+    "a negative offset": at("bufferViews", 0, "byteOffset")(-84),
+    "an offset beyond the bytes": at("bufferViews", 0, "byteOffset")(10**9),
+    "a stride beyond the bytes": at("bufferViews", 0, "byteStride")(10**9),
+    "an offset that is text": at("bufferViews", 0, "byteOffset")("x"),
+    "a view that is not there": at("accessors", 0, "bufferView")(99),
+    "an accessor that is not there": at("meshes", 0, "primitives", 0, "attributes", "POSITION")(99),
+    "an unknown type": at("accessors", 0, "componentType")(1),
+    "indices beyond the vertices": at("meshes", 0, "primitives", 0, "indices")(8),
+    "a mesh of text": at("meshes")("none"),
+    "nodes that are no list": at("nodes")(7),
+    "a node that is not there": at("scenes", 0, "nodes")([5]),
+    "a rotation of nothing": at("nodes", 0, "rotation")([0, 0, 0, 0]),
+    "a matrix that is too small": at("nodes", 0, "matrix")([1, 2]),
+    "fewer names than targets": at("meshes", 0, "extras", "targetNames")(["smile"]),
+    "one name for two targets": at("meshes", 0, "extras", "targetNames")(["a", "a"]),
+    "a name that upsets a terminal": at("meshes", 0, "extras", "targetNames")(["\x1b[2J", "b"]),
+    "a file elsewhere": at("buffers", 0, "uri")("../../etc/passwd"),
+    "a file elsewhere in other signs": at("buffers", 0, "uri")("%2e%2e%2fpasswd"),
+    "the folder above": at("buffers", 0, "uri")(".."),
+    "an address": at("buffers", 0, "uri")("file:///etc/passwd"),
+    "no base64": at("buffers", 0, "uri")("data:a;base64,%%%"),
+    "another version": at("asset", "version")("1.0"),
+    "compression": at("extensionsRequired")(["KHR_draco_mesh_compression"]),
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_hostile_rig_is_one_error(tmp_path: Path, what: str) -> None:
+    path = tmp_path / "face.glb"
+    rewritten(path, HOSTILE[what])
+    with pytest.raises(InputError) as caught:
+        read_gltf_rig(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        at("animations", 0, "channels", 0, "sampler")(4),
+        at("animations", 0, "channels", 0, "target", "node")(4),
+        at("animations", 0, "samplers", 0, "input")(8),
+        at("animations", 0, "samplers", 0, "output")(7),
+        at("animations", 0, "samplers", 0, "interpolation")("CUBICSPLINE"),
+        at("animations")("none"),
+    ],
+)
+def test_a_hostile_animation_is_one_error(tmp_path: Path, change: Any) -> None:
+    path = tmp_path / "face.glb"
+    rewritten(path, change)
+    with pytest.raises(InputError) as caught:
+        read_gltf_take(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_nodes_that_are_each_others_children_end(tmp_path: Path) -> None:
+    rewritten(tmp_path / "a.glb", at("nodes", 0, "children")([0]))
+    assert read_gltf_rig(tmp_path / "a.glb").names == ("smile", "blink")
+
+
+@pytest.mark.parametrize("size", [0, 3, 11, 19, 40, 2000])
+def test_a_file_that_is_cut_short_is_refused(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "face.glb"
+    path.write_bytes(BLENDER.read_bytes()[:size])
+    with pytest.raises(InputError):
+        read_gltf_rig(path)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 2527), st.integers(0, 255)), min_size=1, max_size=4))
+def test_damaged_bytes_give_a_face_or_one_error(tmp_path_factory, changes) -> None:
+    path = tmp_path_factory.getbasetemp() / "damaged.glb"
+    content = bytearray(BLENDER.read_bytes())
+    for place, value in changes:
+        content[place] = value
+    path.write_bytes(content)
+    for read in (read_gltf_rig, read_gltf_take):
+        with suppress(InputError):
+            assert read(path) is not None

@@ -1,0 +1,87 @@
+"""TRC files, as motion capture programs write them, become takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facert.errors import InputError
+from facert.io.trc import read_trc
+
+HEADER = (
+    "PathFileType\t4\t(X/Y/Z)\tface.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\t"
+    "OrigNumFrames\n"
+    "120\t120\t3\t2\tmm\t120\t1\t3\n"
+    "Frame#\tTime\tbrow\t\t\tchin\t\t\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n"
+)
+ROWS = (
+    "\n1\t0.0\t1\t2\t3\t4\t5\t6\n"
+    "2\t0.008333\t1.5\t2\t3\t4\t5\t6.25\n"
+    "3\t0.016667\t2\t2\t3\t4\t5\t7\n"
+)
+
+
+@pytest.fixture(name="path")
+def _path(tmp_path: Path) -> Path:
+    path = tmp_path / "face.trc"
+    path.write_text(HEADER + ROWS)
+    return path
+
+
+def test_positions_times_names_rate_and_unit_are_read(path: Path) -> None:
+    take = read_trc(path)
+    assert take.source.names == ("brow", "chin")
+    np.testing.assert_array_equal(take.source.values[1], [[1.5, 2, 3], [4, 5, 6.25]])
+    np.testing.assert_array_equal(take.time, [0, 0.008333, 0.016667])
+    assert (take.fps, take.units) == (120.0, "mm")
+
+
+@pytest.mark.parametrize(
+    ("line", "lost"),
+    [
+        ("1\t0.0\t\t\t\t4\t5\t6", "brow"),
+        ("1\t0.0\t0\t0\t0\t4\t5\t6", "brow"),
+        ("1\t0.0\tNaN\tNaN\tNaN\t4\t5\t6", "brow"),
+        ("1\t0.0\t1\t2\t3\t\t\t", "chin"),
+        ("1\t0.0\t1\t2\t3", "chin"),
+        ("1\t0.0\t1\t2\t3\t4\t5\t", "chin"),
+    ],
+)
+def test_blank_zero_and_missing_cells_were_not_observed(path: Path, line: str, lost: str) -> None:
+    path.write_text(f"{HEADER}{line}\n2\t0.1\t1\t2\t3\t4\t5\t6\t\t\r\n")
+    take = read_trc(path)
+    assert not take.source.valid[0, take.source.names.index(lost)]
+    assert take.source.valid[0].sum() == 1
+    assert take.source.valid[1].all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("PathFileType", "Path", "line 1: expected PathFileType"),
+        ("Frame#\tTime", "Frame\tSeconds", "line 4"),
+        ("\t3\t2\tmm", "\t3\t5\tmm", "expected 5 markers as NumMarkers says, found 2"),
+        ("chin", "brow", "'brow' twice"),
+        ("\t1.5\t", "\tone\t", "line 8, column brow.x: expected a number"),
+        ("\t6.25\n", "\t6.25\t7\n", "line 8: expected 8 cells"),
+        ("0.016667", "0.0", "/time"),
+        ("0.016667", "", "/time"),
+        (ROWS, "\n", "expected frames after the header"),
+    ],
+)
+def test_what_is_wrong_is_named(path: Path, old: str, new: str, message: str) -> None:
+    path.write_text((HEADER + ROWS).replace(old, new, 1))
+    with pytest.raises(InputError, match=message) as caught:
+        read_trc(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("text", ["", "PathFileType\t4\n", "\n" * 9])
+def test_a_file_without_a_header_is_refused(path: Path, text: str) -> None:
+    path.write_text(text)
+    with pytest.raises(InputError, match="TRC"):
+        read_trc(path)

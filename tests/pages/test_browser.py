@@ -1,0 +1,162 @@
+"""The pages in a real browser: what a person sees, moves and clicks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed")
+
+import facert
+from facert.data import Rig, Take
+from facert.pages.performance import Performance
+from facert.pages.pose_page import PosePage
+from facert.pages.server import address, page_server
+from facert.pages.session import Session
+from facert.pages.view_page import ViewPage
+
+DATA = Path(__file__).parents[2] / "data"
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    return facert.read_rig(DATA / "character.h5")
+
+
+@pytest.fixture(scope="module")
+def recording() -> Take:
+    """Two seconds of the performance, posed throughout."""
+    take = facert.read_take(DATA / "performance.h5")
+    source = replace(take.source, values=take.source.values[:60])
+    return replace(take, time=take.time[:60], source=source, params=take.params[:60])
+
+
+@pytest.fixture(scope="module")
+def retargeter():
+    take = facert.read_take(DATA / "training.h5")
+    return facert.train(take, facert.Settings(method="gpr"))
+
+
+@pytest.fixture
+def view_page(visit, rig, recording, retargeter):
+    result = replace(retargeter.retarget(recording), source=recording.source)
+    with page_server("performance.h5", port=0) as server:
+        page = ViewPage(server, Performance(result, np.array([0, 30]), rig, recording))
+        with visit(address(server)) as seen:
+            yield page, seen
+        page.worker.stop()
+
+
+@pytest.fixture
+def pose_page(visit, rig, recording, retargeter, tmp_path):
+    bare = replace(recording, params=None)
+    session = Session(retargeter.controls, bare, retargeter, tmp_path / "take.posed.h5")
+    with posing(visit, rig, session) as both:
+        yield both
+
+
+@contextmanager
+def posing(visit, rig: Rig, session: Session) -> Iterator[tuple]:
+    with page_server("take.h5", port=0) as server:
+        page = PosePage(server, rig, session)
+        with visit(address(server)) as seen:
+            yield page, seen
+        page.stop()
+
+
+def test_a_performance_is_looked_at(view_page) -> None:
+    page, seen = view_page
+    first = seen.picture()
+    seen.page.get_by_text("off by").first.click()
+    assert seen.until(lambda: page.playback.frame > 0)
+    worst = page.playback.frame
+    assert worst == int(np.argmax(page.performance.errors))
+    assert seen.until(lambda: seen.value("frame") == worst)
+    assert seen.until(lambda: np.abs(seen.picture() - first).max() > 0.1)
+    plain = seen.picture()
+    seen.page.get_by_role("combobox", name="colours").click()
+    seen.page.get_by_role("option", name="error").click()
+    assert seen.until(lambda: np.abs(seen.picture() - plain).max() > 0.1)
+    assert seen.page.locator(".uplot").count() == 3
+    seen.page.get_by_text("◂ key").click()
+    assert seen.until(lambda: page.playback.frame in (0, 30))
+    seen.page.get_by_role("button", name="Play").click()
+    stopped = page.playback.frame
+    assert seen.until(lambda: page.playback.frame != stopped)
+    assert seen.errors == []
+    assert seen.hosts <= {"127.0.0.1", ""}
+
+
+def test_a_frame_is_posed_saved_and_learned_from(pose_page) -> None:
+    page, seen = pose_page
+    names = page.session.controls.names
+    jaw = names.index("jaw_open")
+    seen.page.get_by_role("button", name="Start from neutral").click()
+    assert seen.until(lambda: not page.desk.pose.any())
+    before, pose = seen.picture(), page.desk.pose
+    seen.slide("jaw_open", 0.25)
+    assert seen.until(lambda: page.desk.pins.get(jaw) == pytest.approx(0.25))
+    assert page.worker.finish()
+    moved = {name: page.desk.pose[index] for index, name in enumerate(names)}
+    others = [name for name in names if abs(moved[name] - pose[names.index(name)]) > 0.02]
+    assert len(others) > 3
+    for name in others:
+        assert seen.until(lambda name=name: abs(seen.value(name) - moved[name]) < 0.011)
+    assert seen.until(lambda: np.abs(seen.picture() - before).max() > 0.1)
+    assert seen.page.get_by_text("● jaw_open").count() == 1
+
+    seen.page.get_by_role("button", name="Save as this frame's pose").click()
+    assert seen.until(lambda: page.session.output.exists())
+    assert page.worker.finish()
+    label = facert.read_take(page.session.output)
+    assert label.labels.tolist() == [0]
+    np.testing.assert_allclose(label.params[0], list(moved.values()))
+    assert seen.until(lambda: seen.page.get_by_text("Frame 0 saved").count() == 1)
+    assert not page.desk.pins
+    assert seen.errors == []
+    assert seen.hosts <= {"127.0.0.1", ""}
+
+
+def test_other_poses_are_shown_and_taken_over(pose_page) -> None:
+    page, seen = pose_page
+    page.seek(5)
+    page.pin(page.session.controls.names.index("smile"), 0.7)
+    assert page.worker.finish()
+    followed = page.desk.pose.copy()
+    seen.page.get_by_role("button", name="Other plausible poses").click()
+    seen.page.get_by_role("button", name="other 2").click()
+    assert seen.until(lambda: np.abs(page.desk.pose - followed).max() > 0.01)
+    assert page.desk.pose[page.session.controls.names.index("smile")] == 0.7
+    page.seek(6)
+    assert page.worker.finish()
+    assert not page.desk.pins
+    page.seek(5)
+    assert page.worker.finish()
+    assert list(page.desk.pins.values()) == [0.7]  # what was not saved is there again
+    seen.page.get_by_text("smile  0.70").click()
+    assert seen.until(lambda: not page.desk.pins)
+    assert seen.errors == []
+
+
+def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
+    """No model and no pose to begin with: what the first day looks like."""
+    bare = replace(recording, params=None, animation=None)
+    session = Session(recording.controls, bare, None, tmp_path / "take.posed.h5")
+    with posing(visit, rig, session) as (page, seen):
+        seen.page.get_by_role("button", name="Train on the labels").click()
+        assert seen.until(lambda: seen.page.get_by_text("This did not work").count() == 1)
+        for frame in range(0, 60, 10):
+            session.save(frame, recording.params[frame])
+        seen.page.get_by_role("button", name="Train on the labels").click()
+        assert seen.until(lambda: seen.page.get_by_text("Learned from 6 labels").count() == 1)
+        assert session.model_path.exists()
+        page.seek(15)
+        assert page.worker.finish()
+        assert np.abs(page.desk.pose - recording.params[15]).mean() < 0.2
+        assert seen.errors == []

@@ -1,0 +1,127 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import facert
+from facert.data import Controls, Rig
+from facert.errors import InputError
+from facert.pages.session import Session, character_controls, output_beside
+
+NAMES = ["jaw", "smile", "brow", "blink"]
+
+
+@pytest.fixture
+def session(make_take, tmp_path) -> Session:
+    take = make_take(animation=0)
+    return Session(take.controls, take, output=tmp_path / "take.posed.h5")
+
+
+def free_frame(session: Session) -> int:
+    return int(np.setdiff1d(np.arange(len(session.take)), session.take.labels)[0])
+
+
+def test_a_saved_pose_is_a_label_here_and_in_the_file(session) -> None:
+    before, frame = session.take, free_frame(session)
+    pose = np.array([0.1, 0.2, 0.3, 0.4])
+    path = session.save(frame, pose)
+    written = facert.read_take(path)
+    assert written.params[frame].tolist() == pose.tolist()
+    others = np.delete(np.arange(len(before)), frame)
+    np.testing.assert_array_equal(written.params[others], before.params[others])
+    np.testing.assert_array_equal(written.source.values, before.source.values)
+    assert session.pose(frame)[0].tolist() == pose.tolist()
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_label_counts_only_once_it_is_written(session, tmp_path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    session.output = blocked / "take.posed.h5"
+    frame = free_frame(session)
+    with pytest.raises(InputError, match="output"):
+        session.save(frame, np.zeros(4))
+    assert frame not in session.take.labels
+    assert session.saved == 0
+
+
+def test_training_tells_poses_for_all_frames_and_writes_the_model(session) -> None:
+    frame = free_frame(session)
+    assert session.pose(frame) == (None, None)
+    first = session.train()
+    assert first.labels == 12
+    assert first.change is None
+    pose, std = session.pose(frame)
+    assert pose.shape == std.shape == (4,)
+    session.save(frame, pose + 0.2)
+    second = session.train()
+    assert second.labels == 13
+    assert second.change > 0
+    model = facert.load(session.model_path)
+    np.testing.assert_allclose(model.retarget(session.take).params, session.result.params)
+
+
+def test_what_the_first_model_knew_of_poses_is_not_lost(make_take, tmp_path) -> None:
+    model = facert.train(make_take(), facert.Settings(method="gpr"))
+    bare = make_take(posed=3, animation=0)
+    session = Session(model.controls, bare, model, tmp_path / "take.posed.h5")
+    assert len(session.known.poses) == len(model.poses) + 3
+    session.train()
+    assert len(session.model.poses) == len(model.poses) + 3
+
+
+def test_foretold_poses_are_no_labels(make_take) -> None:
+    take = make_take()
+    model = facert.train(take, facert.Settings(method="gpr"))
+    session = Session(model.controls, model.retarget(take), model)
+    assert not len(session.take.labels)
+
+
+def test_controls_are_matched_by_name(make_take) -> None:
+    take = make_take()
+    turned = Controls(NAMES[::-1])
+    session = Session(turned, take)
+    frame = int(take.labels[0])
+    assert session.pose(frame)[0].tolist() == take.params[frame][::-1].tolist()
+    with pytest.raises(InputError, match="ear"):
+        Session(Controls(["ear", *NAMES[1:]]), take)
+
+
+def test_suggestions_are_frames_without_a_pose(session) -> None:
+    frames = session.suggestion(4).frames
+    assert not set(frames.tolist()) & set(session.take.labels.tolist())
+    session.save(int(frames[0]), np.zeros(4))
+    assert int(frames[0]) not in session.suggestion(4).frames.tolist()
+
+
+def test_poses_of_a_character_are_known_from_three_on(make_take, tmp_path) -> None:
+    take = replace(make_take(posed=0, animation=0), controls=Controls(NAMES))
+    session = Session(take.controls, take, output=tmp_path / "a.posed.h5")
+    for frame in range(3):
+        assert session.known is None
+        session.save(frame, np.full(4, 0.1 * frame))
+    assert len(session.known.poses) == 3
+
+
+def test_without_a_take_nothing_is_saved_or_learned() -> None:
+    session = Session(Controls(NAMES))
+    for attempt in (lambda: session.save(0, np.zeros(4)), session.train):
+        with pytest.raises(InputError, match="--take"):
+            attempt()
+
+
+def test_controls_come_from_the_model_the_take_or_the_rig(make_take) -> None:
+    rig = Rig(np.zeros((3, 3)), np.zeros((1, 3, 3)), ("ear",), np.array([[0, 1, 2]]))
+    assert character_controls(None, make_take(), rig).names == tuple(NAMES)
+    assert character_controls(None, None, rig).limits.tolist() == [[0.0, 1.0]]
+    with pytest.raises(InputError, match="the character"):
+        character_controls(None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("take", "output"),
+    [("a/take.h5", "a/take.posed.h5"), ("take.csv", "take.posed.h5"), ("t.posed.h5", "t.posed.h5")],
+)
+def test_labels_go_beside_the_take(take: str, output: str) -> None:
+    assert output_beside(Path(take)) == Path(output)

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from facert import InputError
+from facert.adjustments import Adjustments
+
+NAMES = ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "browInnerUp"]
+
+
+def test_nothing_asked_changes_nothing():
+    params = np.random.default_rng(0).normal(size=(5, 4))
+    for adjustments in (Adjustments.none(4), Adjustments.of({}, NAMES)):
+        np.testing.assert_array_equal(adjustments.apply(params), params)
+        assert adjustments.smooth_all
+
+
+def test_gain_comes_before_limits():
+    made = Adjustments.of({"jawOpen": {"gain": 2.0, "limits": [0.0, 1.0]}}, NAMES)
+    params = np.array([[0.3, 5.0, 5.0, 5.0], [0.8, 0.0, 0.0, 0.0], [-0.2, 1.0, 1.0, 1.0]])
+    expected = params.copy()
+    expected[:, 0] = [0.6, 1.0, 0.0]
+    np.testing.assert_allclose(made.apply(params), expected)
+
+
+def test_names_are_found_in_any_spelling_and_by_wildcards():
+    made = Adjustments.of({"eyeBlink*": {"gain": 1.2}, "EyeBlink_R": {"gain": 1.5}}, NAMES)
+    np.testing.assert_allclose(made.gain, [1.0, 1.2, 1.5, 1.0])
+
+
+def test_what_a_later_table_does_not_mention_stays():
+    made = Adjustments.of({"*": {"smoothing": 0.3}, "jawOpen": {"gain": 1.1}}, NAMES)
+    np.testing.assert_allclose(made.smoothing, 0.3)
+    np.testing.assert_allclose(made.gain, [1.1, 1.0, 1.0, 1.0])
+
+
+def test_smoothing_goes_from_the_measured_to_the_cleaned():
+    made = Adjustments.of({"jawOpen": {"smoothing": 0.0}, "brow*": {"smoothing": 0.25}}, NAMES)
+    smooth, rough = np.zeros((3, 4)), np.ones((3, 4))
+    np.testing.assert_allclose(made.mixed(smooth, rough), [[1.0, 0.0, 0.0, 0.75]] * 3)
+    assert not made.smooth_all
+
+
+@pytest.mark.parametrize(
+    ("tables", "word"),
+    [
+        ({"jawOpne": {"gain": 1.0}}, "jawOpen"),
+        ({"lid*": {"gain": 1.0}}, "pattern"),
+        ({"jawOpen": 1.0}, "table"),
+        ({"jawOpen": {"gian": 1.0}}, "gain"),
+        ({"jawOpen": {"gain": "much"}}, "number"),
+        ({"jawOpen": {"gain": True}}, "number"),
+        ({"jawOpen": {"smoothing": 1.5}}, "from 0 to 1"),
+        ({"jawOpen": {"limits": [1.0, 0.0]}}, "low, high"),
+        ({"jawOpen": {"limits": 1.0}}, "low, high"),
+        ({"jawOpen": {"limits": ["a", "b"]}}, "low, high"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(tables, word):
+    with pytest.raises(InputError, match=word):
+        Adjustments.of(tables, NAMES)

@@ -1,0 +1,173 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import facert
+from facert import InputError, Settings, Source
+from facert.adjustments import Adjustments
+from facert.handling import AS_IT_IS, Handling
+
+
+@pytest.fixture(scope="module")
+def truth(make_take):
+    return make_take(frames=150, posed=150, markers=8)
+
+
+@pytest.fixture(scope="module")
+def noisy(truth, pose_few):
+    """Noise of a twentieth of the largest standard deviation, and 20 poses."""
+    take = pose_few(truth, 20)
+    scale = 0.05 * take.source.matrix.std(axis=0).max()
+    noise = scale * np.random.default_rng(0).normal(size=take.source.matrix.shape)
+    return replace(take, source=take.source.with_matrix(take.source.matrix + noise))
+
+
+@pytest.fixture(scope="module")
+def retargeter(noisy):
+    return facert.train(noisy, Settings(method="gpr-linear"))
+
+
+def jitter(params):
+    return np.abs(np.diff(params, 2, axis=0)).mean()
+
+
+def rms(values):
+    return np.sqrt(np.mean(values**2))
+
+
+def test_a_stream_gives_what_retargeting_online_gives(retargeter, noisy):
+    whole = retargeter.retarget(noisy, "online")
+    stream = retargeter.stream(noisy.source.names, noisy.fps)
+    for t, frame in enumerate(noisy.source.values[:50]):
+        one = stream.step(frame)
+        np.testing.assert_allclose(one.params, whole.params[t], atol=1e-10)
+        np.testing.assert_allclose(one.std, whole.std[t], atol=1e-10)
+        np.testing.assert_allclose(one.source, whole.source.values[t], atol=1e-10)
+
+
+def test_markers_may_come_in_any_order_and_some_not_at_all(retargeter, noisy):
+    names, order = noisy.source.names, np.array([6, 0, 3, 2, 7, 1, 5])
+    one = retargeter.stream([names[i] for i in order])
+    other = retargeter.stream(names)
+    for frame in noisy.source.values[:20]:
+        hidden = frame.copy()
+        hidden[4] = np.nan
+        expected = other.step(hidden).params
+        np.testing.assert_allclose(one.step(frame[order]).params, expected, atol=1e-10)
+
+
+def test_neighbouring_frames_take_out_noise_offline_most(retargeter, noisy, truth):
+    results = {
+        "as it is": retargeter.retarget(noisy, handling=AS_IT_IS),
+        "online": retargeter.retarget(noisy, "online"),
+        "offline": retargeter.retarget(noisy),
+    }
+    jitters = {name: jitter(result.params) for name, result in results.items()}
+    errors = {name: rms(result.params - truth.params) for name, result in results.items()}
+    assert jitters["offline"] < 0.7 * jitters["online"] < 0.7 * jitters["as it is"]
+    assert errors["offline"] < 1.02 * errors["online"] < 1.02 * errors["as it is"]
+
+
+def test_bad_markers_are_hidden_before_anything_is_mapped(retargeter, noisy, caplog):
+    caplog.set_level("INFO", "facert")
+    values = noisy.source.values.copy()
+    values[40:60, 2] = 0.0
+    bad = replace(noisy, source=Source(values, noisy.source.names))
+    values = values.copy()
+    values[40:60, 2] = np.nan
+    hidden = replace(noisy, source=Source(values, noisy.source.names))
+    for mode in ("offline", "online"):
+        one, other = retargeter.retarget(bad, mode), retargeter.retarget(hidden, mode)
+        np.testing.assert_allclose(one.params, other.params, atol=1e-10)
+        assert "20 zero" in caplog.text or mode == "online"
+        believed = retargeter.retarget(bad, mode, Handling(detect=False))
+        assert np.abs(believed.params - other.params)[40:60].max() > 0.05
+
+
+@pytest.mark.parametrize("mode", ["offline", "online"])
+def test_gain_limits_and_smoothing_are_those_of_each_control(retargeter, noisy, mode):
+    tables = {"jaw": {"gain": 2.0, "limits": [-0.1, 0.1]}, "smile": {"smoothing": 0.0}}
+    adjustments = Adjustments.of(tables, noisy.controls.names)
+    plain = retargeter.retarget(noisy, mode)
+    result = retargeter.retarget(noisy, mode, Handling(adjustments=adjustments))
+    np.testing.assert_allclose(result.params[:, 0], np.clip(2.0 * plain.params[:, 0], -0.1, 0.1))
+    np.testing.assert_allclose(result.std[:, 0], 2.0 * plain.std[:, 0])
+    np.testing.assert_allclose(result.params[:, 2:], plain.params[:, 2:])
+    measured = retargeter.retarget(noisy, handling=AS_IT_IS)
+    np.testing.assert_allclose(result.params[:, 1], measured.params[:, 1], atol=1e-8)
+
+
+@pytest.mark.parametrize("mode", ["offline", "online"])
+def test_markers_stuck_on_anew_are_made_up_for_by_the_actor_at_rest(noisy, mode):
+    retargeter = facert.train(noisy, Settings(method="ridge", neutral="0..10"))
+    shift = np.random.default_rng(1).normal(size=noisy.source.values.shape[1:])
+    moved = replace(noisy, source=Source(noisy.source.values + shift, noisy.source.names))
+    expected = retargeter.retarget(noisy, mode)
+    off = retargeter.retarget(moved, mode)
+    calibrated = retargeter.retarget(moved, mode, Handling(neutral=range(11)))
+    assert rms(off.params - expected.params) > 0.1
+    assert rms(calibrated.params - expected.params) < 0.01
+
+
+def test_a_filled_gap_widens_the_std(retargeter, noisy):
+    values = noisy.source.values.copy()
+    values[60:70, :5] = np.nan
+    gap = replace(noisy, source=Source(values, noisy.source.names))
+    for mode in ("offline", "online"):
+        std, before = (retargeter.retarget(t, mode).std[60:70] for t in (gap, noisy))
+        assert (std.mean(axis=1) > before.mean(axis=1)).all()
+
+
+def test_a_given_noise_is_believed(retargeter, noisy):
+    for mode in ("offline", "online"):
+        exact = retargeter.retarget(noisy, mode, Handling(sigma=0.0)).params
+        rough = retargeter.retarget(noisy, mode, Handling(sigma=1.0)).params
+        assert jitter(rough) < jitter(exact)
+
+
+def test_a_model_of_scattered_frames_streams_them_as_they_come(make_take):
+    take = make_take(frames=60)
+    order = np.random.default_rng(0).permutation(60)
+    scattered = replace(
+        take, source=Source(take.source.values[order], take.source.names), params=take.params[order]
+    )
+    retargeter = facert.train(scattered, Settings(method="gpr-linear"))
+    assert retargeter.motion is None
+    online = retargeter.retarget(take, "online")
+    np.testing.assert_allclose(
+        online.params, retargeter.retarget(take, handling=AS_IT_IS).params, atol=1e-10
+    )
+
+
+@pytest.mark.parametrize("frame", [np.zeros((7, 3)), np.zeros(24), np.full((8, 3), np.inf)])
+def test_a_frame_of_another_shape_or_of_infinite_numbers_is_refused(retargeter, noisy, frame):
+    stream = retargeter.stream(noisy.source.names)
+    with pytest.raises(InputError, match="the frame"):
+        stream.step(frame)
+    assert np.isfinite(stream.step(noisy.source.values[0]).params).all()
+
+
+def test_names_of_another_set_are_refused(retargeter):
+    with pytest.raises(InputError, match="names"):
+        retargeter.stream(["a", "b", "c"])
+
+
+def test_learning_from_smoothed_frames_is_learning_from_less_noise(noisy, truth):
+    smooth = facert.train(noisy, Settings(method="gpr-linear")).retarget(noisy)
+    rough = facert.train(noisy, Settings(method="gpr-linear", smooth=False)).retarget(noisy)
+    assert rms(smooth.params - truth.params) < rms(rough.params - truth.params)
+
+
+def test_what_was_told_of_noise_and_motion_is_reported(noisy):
+    figures = facert.train(noisy, Settings(method="ridge")).figures
+    scale = noisy.source.matrix.std(axis=0).max()
+    assert figures["capture noise, cm"] == pytest.approx(0.05 * scale, rel=0.2)
+    assert figures["motion a frame, cm"] > 0.05 * scale
+
+
+def test_frames_at_rest_must_be_there(noisy, retargeter):
+    with pytest.raises(InputError, match="neutral"):
+        facert.train(noisy, Settings(method="ridge", neutral="500"))
+    with pytest.raises(InputError, match="neutral"):
+        retargeter.retarget(noisy, handling=Handling(neutral=[500]))
