@@ -1,8 +1,8 @@
 """The actor at rest: the same expression in the recording that was learned from and in another.
 
 Markers are stuck on anew, a tracker is calibrated anew; the difference at rest is taken out before
-frames are mapped. Weights are bounded: their rest is moved and what is above it stretched, so that
-a closed lid stays a closed lid.
+frames are mapped. Weights are bounded: where they rest below a half, their rest is moved and what
+is above it stretched, so that a closed lid stays a closed lid.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def calibrated(X: FloatArray, own: FloatArray, learned: FloatArray, kind: Source
     if kind == "markers":
         return X + shift
     own = np.where(np.isnan(own) | np.isnan(learned), 0.0, own)
-    learned = own + shift
-    stretch = np.where(own < FULL, (FULL - learned) / np.where(own < FULL, FULL - own, 1.0), 1.0)
-    above = learned + (X - own) * np.maximum(stretch, 0.0)
-    return np.where(X > own, above, X + shift)
+    # Angles of eyes and head may be anywhere at rest; they are moved, and nothing more.
+    bounded = (own >= 0.0) & (np.maximum(own, own + shift) < FULL / 2.0)
+    stretch = np.where(bounded, (FULL - own - shift) / (FULL - np.where(bounded, own, 0.0)), 1.0)
+    return np.where(X > own, own + shift + (X - own) * stretch, X + shift)
 
 
 def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:

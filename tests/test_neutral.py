@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from facert import InputError
 from facert.neutral import at_rest, calibrated, most_neutral
 
-WEIGHT = st.floats(0.0, 0.9)
+WEIGHT = st.floats(0.0, 0.49)
 
 
 def test_markers_are_moved_by_what_differs_at_rest():
@@ -28,6 +28,12 @@ def test_more_of_a_weight_stays_more(own, learned):
     X = np.linspace(-0.2, 1.2, 50)[:, None]
     moved = calibrated(X, np.array([own]), np.array([learned]), "weights")
     assert (np.diff(moved[:, 0]) > 0.0).all()
+
+
+def test_an_angle_that_rests_anywhere_is_moved_and_nothing_more():
+    X = np.array([[0.8], [0.9], [1.0]])
+    moved = calibrated(X, np.array([0.9]), np.array([0.1]), "weights")
+    np.testing.assert_allclose(moved, X - 0.8)
 
 
 @pytest.mark.parametrize("kind", ["markers", "weights"])

@@ -10,7 +10,7 @@ import typer
 
 from facert.cli import console
 from facert.cli.batch import carry_out, plan
-from facert.cli.options import ENDING, JOBS, OUT_DIR
+from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ def command(
         Path | None,
         typer.Option("--model", "-m", help="Clean by this model of train, not by the take alone."),
     ] = None,
-    no_detect: Annotated[
-        bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
-    ] = False,
+    no_detect: NO_DETECT = False,
     sigma: Annotated[
         float | None,
         typer.Option(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from facert.cli import console
+from facert.cli.options import NO_DETECT
 from facert.errors import InputError, OutputExistsError, reading
 
 if TYPE_CHECKING:
@@ -39,9 +40,7 @@ def command(
             help="A take of the same actor that was stabilised before, for the same head pose.",
         ),
     ] = None,
-    no_detect: Annotated[
-        bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
-    ] = False,
+    no_detect: NO_DETECT = False,
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several.")
     ] = None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from facert.cli import console
+from facert.cli.options import NO_DETECT
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
 from facert.settings import Settings
@@ -81,9 +82,7 @@ def command(
             "neutral", "Frames in which the actor rests, as 12 or 0..20.", "the smallest pose"
         ),
     ] = None,
-    no_detect: Annotated[
-        bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
-    ] = False,
+    no_detect: NO_DETECT = False,
     no_smooth: Annotated[
         bool, typer.Option("--no-smooth", help="Learn from every frame as it was measured.")
     ] = False,
