@@ -10,7 +10,7 @@ import typer
 
 from facert.cli import console
 from facert.cli.batch import carry_out, plan
-from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR
+from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR, SIGMA
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -33,13 +33,7 @@ def command(
         typer.Option("--model", "-m", help="Clean by this model of train, not by the take alone."),
     ] = None,
     no_detect: NO_DETECT = False,
-    sigma: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            help="Standard deviation of the capture noise in the take's units; else estimated.",
-        ),
-    ] = None,
+    sigma: SIGMA = None,
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several.")
     ] = None,

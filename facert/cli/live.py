@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from facert.cli import console
-from facert.cli.options import CONTROLS, NO_DETECT, NO_SMOOTH, chosen_handling
+from facert.cli.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_handling
 from facert.cli.train import DEFAULT_MODEL
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ def command(
     controls_path: CONTROLS = None,
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
+    sigma: SIGMA = None,
     record: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Take of what comes in: .h5, .csv, .livelink.csv."),
@@ -102,7 +103,11 @@ def command(
         senders = _open_senders(stack, ends, controls.names, receiver.counters)
         with reading(source):
             handling = partial(
-                chosen_handling, controls=controls_path, no_detect=no_detect, no_smooth=no_smooth
+                chosen_handling,
+                controls=controls_path,
+                no_detect=no_detect,
+                no_smooth=no_smooth,
+                sigma=sigma,
             )
             mapping = LiveModel(file, retargeter, pattern, receiver.fps, handling)
             stack.enter_context(mapping)

@@ -21,6 +21,13 @@ NO_DETECT = Annotated[
     bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
 ]
 NO_SMOOTH = Annotated[bool, typer.Option("--no-smooth", help="Map every frame as it was measured.")]
+SIGMA = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0,
+        help="Standard deviation of the capture noise in the take's units; else estimated.",
+    ),
+]
 OUT_DIR = Annotated[
     Path | None,
     typer.Option("--out-dir", help="Folder for the results of several takes, named after them."),

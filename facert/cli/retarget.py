@@ -19,6 +19,7 @@ from facert.cli.options import (
     NO_DETECT,
     NO_SMOOTH,
     OUT_DIR,
+    SIGMA,
     chosen_handling,
 )
 from facert.cli.train import DEFAULT_MODEL
@@ -61,13 +62,7 @@ def command(
         ),
     ] = None,
     controls: CONTROLS = None,
-    sigma: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            help="Standard deviation of the capture noise in the take's units; else estimated.",
-        ),
-    ] = None,
+    sigma: SIGMA = None,
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
     target: Annotated[
