@@ -40,6 +40,7 @@ from facert.evaluation.figures import COLOURS, INK, MARKERS
 from facert.handling import AS_IT_IS, Handling
 from facert.metrics import rms
 from facert.normalisation import Normalisation
+from facert.retargeter import Mode
 
 KINDS, SHARES, NOISES = cleaning.KINDS, (0.1, 0.2, 0.4), (0.0, 0.05, 0.1, 0.2)
 PATTERNS = (("none", 0.0), *product(KINDS, SHARES))
@@ -162,12 +163,13 @@ def motion(cell: Cell) -> dict[str, object]:
         record["learned clean RMS"] = clean.error(learned_clean)
         for part, height in _heights(reference, learned_clean).items():
             record[f"learned clean {part}"] = height
-        for name, mode, handling in (
-            ("offline", "offline", None),
-            ("online", "online", None),
-            ("frame by frame", "offline", Handling(smooth=False)),
-        ):
-            result = retargeter.retarget(spoilt.take, mode, handling)  # type: ignore[arg-type]
+        ways: dict[str, tuple[Mode, Handling | None]] = {
+            "offline": ("offline", None),
+            "online": ("online", None),
+            "frame by frame": ("offline", Handling(smooth=False)),
+        }
+        for name, (mode, handling) in ways.items():
+            result = retargeter.retarget(spoilt.take, mode, handling)
             assert result.params is not None
             record[f"{name} RMS"] = spoilt.error(result)
             record[f"{name} jitter"] = float(np.abs(np.diff(result.params, 2, axis=0)).mean())
