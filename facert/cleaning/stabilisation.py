@@ -15,10 +15,10 @@ from typing import Literal
 
 import numpy as np
 
-from facert.cleaning.rigid import RigidMotion, align, determined, mean_motion
 from facert.data import BoolArray, FloatArray, IntArray, Source, Take
 from facert.errors import InputError
 from facert.names import match
+from facert.rigid import RigidMotion, align, determined, mean_motion
 
 log = logging.getLogger(__name__)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facert.cleaning.rigid import RigidMotion
 from facert.data import Source, Take
+from facert.rigid import RigidMotion
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import facert as api
-from facert.cleaning.rigid import RigidMotion
 from facert.data import Source, Take
 from facert.io.take import read_take
+from facert.rigid import RigidMotion
 
 NAMES = tuple(f"m{i}" for i in range(8))
 
@@ -69,7 +69,7 @@ def test_frames_that_show_too_few_are_told(facert, files):
     moved[30:34, :3] = np.nan
     write(take, moved)
     done = facert("stabilise", take, output, "--stable", "m0,m1,m2,m3")
-    assert "4 frames show fewer than three stable markers" in done.err
+    assert "in 4 frames with fewer than three stable markers" in done.err
 
 
 @pytest.mark.parametrize(

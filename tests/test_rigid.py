@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from facert.cleaning.rigid import RigidMotion, align, determined, mean_motion
+from facert.rigid import RigidMotion, align, determined, mean_motion
 
 
 def some_motion(frames=30, seed=0):
@@ -103,3 +103,20 @@ def test_the_mean_of_opposite_turns_is_none():
     found = mean_motion(RigidMotion(turns, np.array([[1.0, 0, 0], [3.0, 0, 0]])))
     np.testing.assert_allclose(found.rotations[0], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(found.translations[0], [2.0, 0, 0])
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_with_a_pull_too_few_points_turn_no_further_than_they_must(count):
+    shape = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 3.0]])[:count]
+    moved = shape[None] + np.array([0.5, -1.0, 2.0])
+    motion = align(shape, moved, np.ones((1, count)), pull=1e-6)
+    np.testing.assert_allclose(motion.rotations[0], np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(motion.apply(shape), moved, atol=1e-9)
+
+
+def test_a_small_pull_changes_little_where_points_decide():
+    rng = np.random.default_rng(4)
+    shape = rng.normal(size=(12, 3))
+    turned = shape @ Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix().T
+    motion = align(shape, turned[None], np.ones((1, 12)), pull=1e-6)
+    np.testing.assert_allclose(motion.apply(shape)[0], turned, atol=1e-5)

@@ -81,7 +81,9 @@ class RigidMotion:
         return len(self.rotations)
 
 
-def align(shape: FloatArray, points: FloatArray, weights: FloatArray) -> RigidMotion:
+def align(
+    shape: FloatArray, points: FloatArray, weights: FloatArray, pull: float = 0.0
+) -> RigidMotion:
     """The motion of each frame that takes a shape nearest to points, by weighted least squares.
 
     Parameters
@@ -91,6 +93,9 @@ def align(shape: FloatArray, points: FloatArray, weights: FloatArray) -> RigidMo
         What has no weight may be NaN.
     weights : array, shape (T, m)
         Not negative; with all zero, the motion means nothing.
+    pull : float
+        Towards no rotation, relative to the spread of the shape: decides where its points are too
+        few, or lie on a line.
     """
     share = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     seen = np.where(weights[:, :, None] > 0, points, 0.0)
@@ -98,6 +103,10 @@ def align(shape: FloatArray, points: FloatArray, weights: FloatArray) -> RigidMo
     arms = seen - centre[:, None]
     covariance = (arms * share[:, :, None]).transpose(0, 2, 1) @ shape
     covariance -= np.einsum("tm,tmi,tj->tij", share, arms, rest)
+    if pull:
+        spread = np.einsum("tm,tmi->t", share, (shape - rest[:, None]) ** 2)
+        towards = np.where(spread > 0.0, pull * spread, 1.0)
+        covariance += towards[:, None, None] * np.eye(3)
     U, _, Vt = np.linalg.svd(covariance)
     turn = np.ones_like(centre)
     turn[:, 2] = np.sign(np.linalg.det(U @ Vt))  # a rotation, never a mirror

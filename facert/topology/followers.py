@@ -13,8 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facert.data import BoolArray, FloatArray, IntArray
+from facert.rigid import align
 
-REST = 1e-6  # of the anchors' spread: how hard the pull towards no rotation is
+PULL = 1e-6  # towards no rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +42,9 @@ class Follower:
         deformed : array, shape (T, V, 3)
             With the anchors where they should be.
         """
-        rest = neutral[self.anchors]
-        rotations, moved = best_rotations(rest, deformed[:, self.anchors])
-        arms = neutral[self.part] - rest.mean(axis=0)
-        deformed[:, self.part] = arms @ rotations.transpose(0, 2, 1) + moved[:, None, :]
+        anchors = deformed[:, self.anchors]
+        motion = align(neutral[self.anchors], anchors, np.ones(anchors.shape[:2]), PULL)
+        deformed[:, self.part] = motion.apply(neutral[self.part])
 
 
 def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> list[Follower]:
@@ -71,26 +71,3 @@ def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> li
         near = candidates[nearest]
         found.append(Follower(part, np.unique(near[components[near] == home])))
     return found
-
-
-def best_rotations(rest: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rotation and place of the centre that take points nearest to others, for many frames.
-
-    Parameters
-    ----------
-    rest : array, shape (m, 3)
-    moved : array, shape (T, m, 3)
-
-    Returns
-    -------
-    rotations : array, shape (T, 3, 3)
-    centres : array, shape (T, 3)
-        Of the moved points.
-    """
-    arms, centres = rest - rest.mean(axis=0), moved.mean(axis=1)
-    covariance = (moved - centres[:, None, :]).transpose(0, 2, 1) @ arms
-    pull = REST * float(np.sum(arms**2)) or 1.0
-    U, _, Vt = np.linalg.svd(covariance + pull * np.eye(3))
-    turn = np.ones((len(moved), 3))
-    turn[:, 2] = np.sign(np.linalg.det(U @ Vt))  # a rotation, never a mirror
-    return np.asarray((U * turn[:, None, :]) @ Vt), np.asarray(centres)
