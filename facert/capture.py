@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from facert.data import Controls, FloatArray, IntArray, Rig, Source, Take
 from facert.errors import InputError
 from facert.names import NameIndex, folded
+from facert.wording import plural
 
 log = logging.getLogger("facert")
 
@@ -142,9 +143,9 @@ def _drive(rig: Rig, source: Source) -> IntArray:
             f"none of them, e.g. {source.names[0]!r}",
             "Choose other shapes of the rig, or rename them.",
         )
-    _tell("shapes of the rig rest", [rig.names[i] for i in np.flatnonzero(drive < 0)])
+    _tell("shape", "of the rig without a weight", [rig.names[i] for i in np.flatnonzero(drive < 0)])
     unused = np.setdiff1d(np.arange(len(source.names)), drive)
-    _tell("weights move nothing", [source.names[i] for i in unused])
+    _tell("weight", "without a shape of the rig", [source.names[i] for i in unused])
     return drive
 
 
@@ -194,6 +195,6 @@ def _check(good: bool, option: str, expected: str, found: object) -> None:
         raise InputError(option, expected, found, "Choose another value.", where="options")
 
 
-def _tell(what: str, names: Sequence[str]) -> None:
+def _tell(noun: str, what: str, names: Sequence[str]) -> None:
     if names:
-        log.info("%d %s: %s", len(names), what, ", ".join(names))
+        log.info("%s %s: %s", plural(len(names), noun), what, ", ".join(names))

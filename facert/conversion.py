@@ -64,7 +64,7 @@ def converted(found: Take | Rig, changes: Changes) -> Take | Rig:
     """
     if changes.names:
         found = renamed(found, changes.names)
-    found = _in_space(found, changes)
+    found = in_space(found, changes)
     if isinstance(found, Take):
         return _in_time(found, changes)
     if changes.of_frames:
@@ -73,7 +73,8 @@ def converted(found: Take | Rig, changes: Changes) -> Take | Rig:
     return found
 
 
-def _in_space(found: Take | Rig, changes: Changes) -> Take | Rig:
+def in_space(found: Take | Rig, changes: Changes) -> Take | Rig:
+    """The take or rig with the changes of unit and axis alone."""
     if changes.in_units:
         found = replace(found, units=changes.in_units)
     if changes.units:

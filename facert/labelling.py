@@ -12,6 +12,7 @@ from facert.data import Controls, FloatArray, IntArray, Rig, Take
 from facert.errors import InputError, reading
 from facert.names import match, shape_drivers
 from facert.resampling import nearest_frames
+from facert.wording import plural
 
 log = logging.getLogger("facert")
 
@@ -168,7 +169,8 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
         raise InputError("/source/names", "names of the rig's shapes", found, "Give another rig.")
     left_out = [name for i, name in enumerate(poses.names) if i not in set(kept)]
     if left_out:
-        log.warning("%d weights move nothing: %s", len(left_out), ", ".join(left_out))
+        told = "no shape for %s, left out: %s"
+        log.warning(told, plural(len(left_out), "weight"), ", ".join(left_out))
     values = poses.values[:, kept]
     whole = np.asarray(~np.isnan(values).any(axis=1))
     if not whole.any():

@@ -8,6 +8,7 @@ is above it stretched, so that a closed lid stays a closed lid.
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,25 +23,54 @@ FULL = 1.0
 """A weight that is fully there."""
 
 
-def calibrated(X: FloatArray, own: FloatArray, learned: FloatArray, kind: SourceKind) -> FloatArray:
-    """Frames as the actor would have shown them in the recording that was learned from.
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Takes frames to what the actor would have shown in the recording that was learned from.
 
     Parameters
     ----------
-    X : array, shape (T, d)
-        NaN: not observed.
-    own, learned : array, shape (d,)
-        The actor at rest in this and in that recording; NaN: not known, nothing is changed.
-    kind : {"markers", "weights"}
+    turn : array, shape (d,)
+        The actor at rest, where a weight's motion begins; infinite where it is only moved.
+    shift : array, shape (d,)
+        How far the rest is moved.
+    stretch : array, shape (d,)
+        By how much what is above `turn` is stretched, less 1.
     """
-    shift = np.nan_to_num(learned - own)
-    if kind == "markers":
-        return X + shift
-    own = np.where(np.isnan(own) | np.isnan(learned), 0.0, own)
-    # Angles of eyes and head may be anywhere at rest; they are moved, and nothing more.
-    bounded = (own >= 0.0) & (np.maximum(own, own + shift) < FULL / 2.0)
-    stretch = np.where(bounded, (FULL - own - shift) / (FULL - np.where(bounded, own, 0.0)), 1.0)
-    return np.where(X > own, own + shift + (X - own) * stretch, X + shift)
+
+    turn: FloatArray
+    shift: FloatArray
+    stretch: FloatArray
+
+    @classmethod
+    def of(cls, own: FloatArray, learned: FloatArray, kind: SourceKind) -> Calibration:
+        """From the actor at rest in this and in that recording.
+
+        Parameters
+        ----------
+        own, learned : array, shape (d,)
+            NaN: not known, nothing is changed.
+        kind : {"markers", "weights"}
+        """
+        shift = np.nan_to_num(learned - own)
+        if kind == "markers":
+            return cls(np.full_like(shift, np.inf), shift, np.zeros_like(shift))
+        own = np.where(np.isnan(own) | np.isnan(learned), 0.0, own)
+        # Angles of eyes and head may be anywhere at rest; they are moved, and nothing more.
+        bounded = (own >= 0.0) & (np.maximum(own, own + shift) < FULL / 2.0)
+        room = FULL - np.where(bounded, own, 0.0)
+        return cls(np.where(bounded, own, np.inf), shift, np.where(bounded, -shift / room, 0.0))
+
+    def apply(self, X: FloatArray) -> FloatArray:
+        """Frames (T, d) or one of them, (d,); NaN stays."""
+        return np.asarray(X + self.shift + np.maximum(X - self.turn, 0.0) * self.stretch)
+
+
+def calibrated(X: FloatArray, own: FloatArray, learned: FloatArray, kind: SourceKind) -> FloatArray:
+    """Frames X (T, d) as they would have been in the recording that was learned from.
+
+    See `Calibration.of`.
+    """
+    return Calibration.of(own, learned, kind).apply(X)
 
 
 def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
@@ -62,6 +92,24 @@ def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
     seen = ~np.isnan(X[frames])
     total = np.where(seen, X[frames], 0.0).sum(axis=0)
     return np.where(seen.any(axis=0), total / np.maximum(seen.sum(axis=0), 1), np.nan)
+
+
+def median_at_rest(X: FloatArray, scale: float) -> FloatArray:
+    """The median of frames in which the actor rests but may blink, (d,); NaN where none shows it.
+
+    Parameters
+    ----------
+    X : array, shape (T, d)
+        NaN: not observed.
+    scale : float
+        Standard deviation of a source in motion, in its units.
+    """
+    shown = ~np.isnan(X).all(axis=0)
+    rest = np.full(X.shape[1], np.nan)
+    rest[shown] = np.nanmedian(X[:, shown], axis=0)
+    if np.nanmax(np.nanstd(X[:, shown], axis=0), initial=0.0) > RESTLESS * scale:
+        log.warning("the actor moves when at rest: the median is taken for it")
+    return rest
 
 
 def most_neutral(poses: FloatArray) -> int:

@@ -60,6 +60,10 @@ class Normalisation:
             )
         return cls(mean, scale)
 
+    def seen_from(self, other: Normalisation) -> Normalisation:
+        """The map from the units of another normalisation of the same data to these."""
+        return Normalisation(other.apply(self.mean), self.scale / other.scale)
+
     def apply(self, values: FloatArray) -> FloatArray:
         """To normalised units, (n, d)."""
         return (values - self.mean) / self.scale

@@ -15,6 +15,7 @@ from facert.data import Source, Take
 from facert.normalisation import Normalisation
 from facert.settings import Settings
 from facert.training_set import MIN_OBSERVED
+from facert.wording import plural
 
 log = logging.getLogger(__name__)
 
@@ -103,4 +104,5 @@ def _warn_of_zeros(source: Source) -> None:
         return
     zeros = int(np.sum(~source.values.any(axis=2)))
     if zeros:
-        log.warning("%d marker positions are exactly (0, 0, 0): lost ones should be NaN", zeros)
+        positions = plural(zeros, "marker position")
+        log.warning("%s exactly at (0, 0, 0): lost ones should be NaN", positions)

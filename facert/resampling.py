@@ -15,6 +15,7 @@ import numpy as np
 
 from facert.data import FloatArray, IntArray, Source, Take
 from facert.errors import InputError
+from facert.wording import plural
 
 log = logging.getLogger("facert")
 
@@ -153,10 +154,10 @@ def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, I
 def _tell_moves(shifts: FloatArray, lost: int) -> None:
     moved = shifts[shifts > _SAME]
     if len(moved):
-        most = 1e3 * moved.max()
-        log.warning("%d poses moved by up to %.0f ms to the nearest frame", len(moved), most)
+        poses, most = plural(len(moved), "pose"), 1e3 * moved.max()
+        log.warning("%s moved by up to %.0f ms to the nearest frame", poses, most)
     if lost:
-        log.warning("%d poses have no frame near that is free, and are left out", lost)
+        log.warning("left out %s without a free frame near by", plural(lost, "pose"))
 
 
 def _recounted(start: str, old: float, new: float) -> str:

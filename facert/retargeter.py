@@ -79,7 +79,11 @@ class Retargeter:
     motion: Motion | None = None
 
     def retarget(
-        self, take: Take, mode: Mode = "offline", handling: Handling | None = None
+        self,
+        take: Take,
+        mode: Mode = "offline",
+        handling: Handling | None = None,
+        device: str = "cpu",
     ) -> Take:
         """The take with a pose in every frame, and a cleaned source.
 
@@ -95,9 +99,14 @@ class Retargeter:
             other, as a live stream would be.
         handling : Handling, optional
             What is done about bad markers, noise, the actor's rest and single controls.
+        device : str
+            Where the shared models map all frames at once: ``"cpu"`` or ``"cuda"``. One after the
+            other they are mapped on the CPU.
 
         Raises
         ------
+        DeviceError
+            When the device is not there.
         InputError
             When the source is of another kind or lacks names that the model needs.
         """
@@ -115,7 +124,7 @@ class Retargeter:
         try:
             if mode == "online":
                 return self._one_by_one(take, handling)
-            return self._together(take, handling)
+            return replace(self, method=self.method.on(device))._together(take, handling)
         except (np.linalg.LinAlgError, OverflowError):
             raise NumericalError("the model's numbers are too large or small to map with") from None
 
@@ -231,7 +240,7 @@ class Retargeter:
         _check_distance(self.source_units.apply(X))
         stream = self.stream(take.source.names, 1.0 / grid(take.time)[1], handling, rest)
         with threads_for(1):
-            steps = [stream.step(frame) for frame in values]
+            steps = [stream.step(frame).complete() for frame in values]
         stds = [step.std for step in steps if step.std is not None]
         return self._performance(
             take,

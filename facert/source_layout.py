@@ -38,6 +38,32 @@ class Places:
         return picked
 
 
+class FramePicker:
+    """`Places.pick` for single frames, as flat rows.
+
+    Parameters
+    ----------
+    places : Places
+    names : int
+        How many the source has.
+    numbers : int
+        Of each: 3 for a marker, 1 for a weight.
+    """
+
+    def __init__(self, places: Places, names: int, numbers: int) -> None:
+        nothing = names
+        theirs = np.full(places.count, nothing)
+        theirs[places.ours] = places.theirs
+        self._index = (theirs[:, None] * numbers + np.arange(numbers)).ravel()
+        self._padded = np.full((names + 1) * numbers, np.nan)
+        self._own = self._padded[: names * numbers]
+
+    def pick(self, values: FloatArray) -> FloatArray:
+        """Values (names, ...) in the model's order, (d_x,); NaN where the source has none."""
+        self._own[:] = values.ravel()
+        return self._padded.take(self._index)
+
+
 @dataclass(frozen=True)
 class SourceLayout:
     """What a model takes.

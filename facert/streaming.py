@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from facert.adjustments import Adjustments
 from facert.cleaning.estimate import LEAST_NOISE
-from facert.cleaning.filtering import MotionFilter, NoiseMeter
+from facert.cleaning.filtering import MotionFilter, NoiseMeter, Seen
 from facert.cleaning.watching import MarkerWatch
-from facert.data import BoolArray, FloatArray
+from facert.data import FloatArray
 from facert.errors import InputError
 from facert.handling import Handling
-from facert.neutral import calibrated
+from facert.methods.base import Prediction
+from facert.neutral import Calibration
+from facert.source_layout import FramePicker
 
 if TYPE_CHECKING:
     from facert.retargeter import Retargeter
 
 
-@dataclass(frozen=True, eq=False)
+Tell = Callable[[], tuple[FloatArray | None, FloatArray]]
+"""Works out the standard deviation of a pose, and the cleaned source."""
+
+
 class Streamed:
     """What became of one frame.
 
@@ -29,15 +33,32 @@ class Streamed:
     ----------
     params : array, shape (P,)
         The pose.
-    std : array, shape (P,), or None
-        Its standard deviation, where the method has one.
-    source : array, shape (M, 3) or (D,)
-        The cleaned source, in the model's order.
+    tell : callable
+        Works out `std` and `source` when somebody asks: who wants the pose at once does not.
     """
 
-    params: FloatArray
-    std: FloatArray | None
-    source: FloatArray
+    def __init__(self, params: FloatArray, tell: Tell) -> None:
+        self.params = params
+        self._tell: Tell | None = tell
+        self._std: FloatArray | None = None
+        self._source = np.zeros(0)
+
+    def complete(self) -> Streamed:
+        """Work out all, and let go of what that takes; itself."""
+        if self._tell is not None:
+            self._std, self._source = self._tell()
+            self._tell = None
+        return self
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviation of the pose, (P,), where the method has one."""
+        return self.complete()._std
+
+    @property
+    def source(self) -> FloatArray:
+        """The cleaned source, (M, 3) or (D,), in the model's order."""
+        return self.complete()._source
 
 
 class RetargetStream:
@@ -72,18 +93,45 @@ class RetargetStream:
         handling = handling or Handling()
         if fps is not None and not 0.0 < fps < np.inf:
             raise InputError("fps", "a number above 0", repr(fps), "Give the true rate.")
-        self._retargeter = retargeter
-        self._places = retargeter.layout.places(names)
+        places = retargeter.layout.places(names)
         markers = retargeter.layout.kind == "markers"
+        self._retargeter = retargeter
         self._shape = (len(names), 3) if markers else (len(names),)
-        self._watch = MarkerWatch() if handling.detect and markers else None
+        self._cleaned_shape = (-1, 3) if markers else (-1,)
+        self._picker = FramePicker(places, len(names), 3 if markers else 1)
+        self._watch = MarkerWatch(len(names)) if handling.detect and markers else None
         self._filter = _filter(retargeter, fps, handling)
-        given = handling.sigma is not None
+        given = self._filter is None or handling.sigma is not None
         self._meter = None if given else NoiseMeter(len(retargeter.source_units.mean))
+        self._unheard: FloatArray | None = None
         self._adjustments = handling.adjustments or Adjustments.none(len(retargeter.controls.names))
+        self._finish = _Finish(retargeter, self._adjustments)
         self._smooth = retargeter.method.stream()
         self._rough = None if self._adjustments.smooth_all else retargeter.method.stream()
-        self._rest = None if rest is None else self._row(self._checked(rest))
+        self._calibration: Calibration | None = None
+        if rest is not None:
+            self.calibrate(rest)
+
+    def calibrate(self, rest: FloatArray) -> None:
+        """Make up, from the next frame on, for where the actor is at rest.
+
+        Parameters
+        ----------
+        rest : array, shape of a frame
+            The source with the actor at rest; NaN where that is not known.
+        """
+        own, model = self._picker.pick(self._checked(rest)), self._retargeter
+        self._calibration = Calibration.of(own, model.neutral, model.layout.kind)
+
+    def prepare(self) -> None:
+        """Do what need not wait for the next frame; `step` does it where nobody did."""
+        if self._filter is None:
+            return
+        if self._meter is not None and self._unheard is not None:
+            heard, self._unheard = self._meter.step(self._unheard), None
+            if heard is not None:
+                self._filter.hear(max(heard, LEAST_NOISE))
+        self._filter.look_ahead()
 
     def step(self, values: FloatArray) -> Streamed:
         """Map one more frame; quickest within `facert.threads.threads_for` of one point.
@@ -99,48 +147,78 @@ class RetargetStream:
             For another shape, or numbers that are infinite.
         """
         values = self._checked(values)
-        if self._watch is not None:
-            values[self._watch.step(values)] = np.nan
-        return self._mapped(self._row(values))
+        self.prepare()
+        row, seen = self._observed(values)
+        if self._calibration is not None:
+            row = self._calibration.apply(row)
+        frame = self._retargeter.source_units.apply(row)
+        clean, doubt = self._cleaned(frame, seen)
+        said = self._smooth.step(clean[None], doubt)
+        Y = said.Y
+        if self._rough is not None:
+            measured = frame if seen is None else np.where(seen, frame, clean)
+            Y = self._adjustments.mixed(Y, self._rough.step(measured[None], doubt).Y)
+        return Streamed(self._finish.params(Y[0]), lambda: self._told(said))
 
     def _checked(self, values: FloatArray) -> FloatArray:
-        """A copy of a frame; raises InputError when it is not one."""
-        values = np.array(values, dtype=np.float64)
+        """A frame as an array; raises InputError when it is not one."""
+        values = np.asarray(values, dtype=np.float64)
         if values.shape != self._shape or np.isinf(values).any():
             found = "infinite numbers" if values.shape == self._shape else f"{values.shape}"
             raise InputError("the frame", f"numbers of shape {self._shape}", found, "Skip it.")
         return values
 
-    def _row(self, values: FloatArray) -> FloatArray:
-        """A frame in the model's order and the source's units, (d_x,)."""
-        if values.ndim == 2:
-            values = np.where(np.isnan(values).any(axis=1, keepdims=True), np.nan, values)
-        return self._places.pick(values[None]).ravel()
+    def _observed(self, values: FloatArray) -> tuple[FloatArray, Seen]:
+        """A frame in the model's order and the source's units, (d_x,), and what it shows."""
+        if self._watch is not None:
+            bad = self._watch.step(values)
+            if bad.any():
+                values = np.where(bad[:, None], np.nan, values)
+        row = self._picker.pick(values)
+        hidden = np.isnan(row)
+        if not hidden.any():
+            return row, None
+        if values.ndim == 2:  # what hides one of its coordinates hides a marker
+            hidden = np.repeat(hidden.reshape(-1, 3).any(axis=1), 3)
+            row[hidden] = np.nan
+        return row, ~hidden
 
-    def _mapped(self, row: FloatArray) -> Streamed:
-        model, adjust = self._retargeter, self._adjustments
-        if self._rest is not None:
-            row = calibrated(row[None], self._rest, model.neutral, model.layout.kind)[0]
-        frame = model.source_units.apply(row)
-        clean, doubt = self._cleaned(frame, ~np.isnan(frame))
-        said = self._smooth.step(clean[None], doubt)
-        Y = said.Y
-        if self._rough is not None:
-            measured = np.where(np.isnan(frame), clean, frame)
-            Y = adjust.mixed(Y, self._rough.step(measured[None], doubt).Y)
-        params, std = model.finished(Y, said.std, adjust)
-        source = model.source_units.undo(said.X)[0]
-        shape = (-1, 3) if model.layout.kind == "markers" else (-1,)
-        return Streamed(params[0], None if std is None else std[0], source.reshape(shape))
-
-    def _cleaned(self, frame: FloatArray, seen: BoolArray) -> tuple[FloatArray, FloatArray | None]:
+    def _cleaned(self, frame: FloatArray, seen: Seen) -> tuple[FloatArray, FloatArray | None]:
+        """The frame without noise, (d_x,), and the variance of what it did not show, (1, d_x)."""
         if self._filter is None:
             return frame, None
-        heard = None if self._meter is None else self._meter.step(frame)
-        if heard is not None:
-            self._filter.hear(max(heard, LEAST_NOISE))
-        mean, variance = self._filter.step(frame)
-        return mean, np.where(seen, 0.0, variance)[None]
+        self._unheard = frame
+        mean = self._filter.step(frame, seen)
+        return mean, None if seen is None else np.where(seen, 0.0, self._filter.variance)[None]
+
+    def _told(self, said: Prediction) -> tuple[FloatArray | None, FloatArray]:
+        """Standard deviation of the pose, and the cleaned source."""
+        source = self._retargeter.source_units.undo(said.X[0])
+        return self._finish.spread(said.std), source.reshape(self._cleaned_shape)
+
+
+class _Finish:
+    """`Retargeter.finished` for single poses: limits, gain and limits again as one of each."""
+
+    def __init__(self, model: Retargeter, adjustments: Adjustments) -> None:
+        units, gain = model.target_units, adjustments.gain
+        self._scale, self._offset = units.scale * gain, units.mean * gain
+        self._spread = units.scale * np.abs(gain)
+        ends = np.tile([[-np.inf], [np.inf]], len(gain)) if model.bounds is None else model.bounds.T
+        moved = np.where(gain == 0.0, 0.0, ends * np.where(gain == 0.0, 1.0, gain))  # 0 inf is NaN
+        self._low, self._high = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
+
+    def params(self, Y: FloatArray) -> FloatArray:
+        """Of a normalised pose, (P,)."""
+        params = Y * self._scale
+        params += self._offset
+        np.maximum(params, self._low, out=params)
+        np.minimum(params, self._high, out=params)
+        return params
+
+    def spread(self, std: FloatArray | None) -> FloatArray | None:
+        """Of that of the normalised pose, (1, P)."""
+        return None if std is None else np.asarray(std[0] * self._spread)
 
 
 def _filter(retargeter: Retargeter, fps: float | None, handling: Handling) -> MotionFilter | None:

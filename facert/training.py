@@ -21,8 +21,10 @@ from facert.posing.known import keep
 from facert.preparation import Prepared, prepare
 from facert.ranges import parse_frames
 from facert.regions.layout import FaceData, method_for
+from facert.regions.nouns import Regions
 from facert.regions.resolution import resolved
 from facert.retargeter import Retargeter
+from facert.sanity import check_poses, warn_if_constant
 from facert.settings import LimitRule, Settings
 from facert.source_layout import SourceLayout
 from facert.training_set import TrainingSet, choose_training_set
@@ -33,7 +35,10 @@ IN_TARGET_UNITS = ("training reconstruction", "error at poses left out")
 
 
 def train(
-    take: Take, settings: Settings | None = None, monitor: Monitor | None = None
+    take: Take,
+    settings: Settings | None = None,
+    monitor: Monitor | None = None,
+    start: Retargeter | None = None,
 ) -> Retargeter:
     """Learn to retarget from a take's labels, its other frames, and its animation.
 
@@ -42,23 +47,28 @@ def train(
     take : Take
         With poses in some frames.
     settings : Settings, optional
-        By default a blend of experts, see `facert.methods.blend`.
+        By default those of the start, else a blend of experts, see `facert.methods.blend`.
     monitor : Monitor, optional
         Watches the training; see `facert.gplvm.training`.
+    start : Retargeter, optional
+        What a shared model begins at, as after a label was added to the take that it was trained
+        on: frames and poses that it knows keep their latent coordinates, and a few iterations
+        do. The other methods learn in one go, and begin anew.
 
     Raises
     ------
     InputError
-        When the take has too few labels, or source or poses that never change.
+        When the take has too few labels, or source or poses that never change; or when `start` is
+        of other settings, or another character.
     """
-    settings = settings or Settings()
+    if settings is None:
+        settings = Settings() if start is None else replace(start.settings, labels=None)
     if settings.unlabelled is None:
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
     controls = take.controls
     if controls is None:
         raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
-    if take.std is not None:
-        log.warning("the poses have a standard deviation: they were foretold, and count as posed")
+    check_poses(take)
     prepared = prepare(take, settings)
     settings = replace(settings, regions=resolved(settings.regions, take, prepared.take))
     take, source_units = prepared.take, prepared.units
@@ -79,12 +89,21 @@ def train(
     )
     face = FaceData(prepared.measured, controls, poses, data.X_labelled, complete)
     method = method_for(settings, given, face)
+    layout = SourceLayout(take.source.kind, take.source.names)
+    if start is not None:
+        _require_same_kind(start, settings, layout, controls)
+        method.begin_at(
+            start.method,
+            source_units.seen_from(start.source_units),
+            target_units.seen_from(start.target_units),
+        )
     began = time.perf_counter()
     report = method.fit(labelled, unlabelled, monitor or Monitor())
     seconds = time.perf_counter() - began
+    warn_if_constant(method, np.vstack([labelled.X, unlabelled.X]), labelled.Y)
     return Retargeter(
         method=method,
-        layout=SourceLayout(take.source.kind, take.source.names),
+        layout=layout,
         units=take.units,
         controls=controls,
         bounds=bounds,
@@ -96,6 +115,37 @@ def train(
         motion=prepared.motion,
         poses=keep(data.Y_labelled, take.animation, settings.seed),
     )
+
+
+def _require_same_kind(
+    start: Retargeter, settings: Settings, layout: SourceLayout, controls: Controls
+) -> None:
+    """A model can begin at another one of the same form.
+
+    Raises
+    ------
+    InputError
+        When it has another one.
+    """
+    regions = [
+        s.regions.names if isinstance(s.regions, Regions) else None
+        for s in (settings, start.settings)
+    ]
+    forms = {
+        "method": (settings.method, start.settings.method),
+        "latent_dim": (settings.latent_dim, start.settings.latent_dim),
+        "regions": (regions[0], regions[1]),
+        "source": (layout.names, start.layout.names),
+        "controls": (controls.names, start.controls.names),
+    }
+    for field, (expected, found) in forms.items():
+        if expected != found:
+            fix = "Start from a model of this take's kind, or anew."
+            raise InputError(f"the start's {field}", _brief(expected), _brief(found), fix)
+
+
+def _brief(value: object) -> str:
+    return f"{len(value)} names" if isinstance(value, tuple) else str(value)
 
 
 def _neutral(take: Take, data: TrainingSet, settings: Settings) -> FloatArray:

@@ -48,7 +48,9 @@ def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
     """Draw labelled and unlabelled data as the settings ask, by their seed.
 
     Labels are the frames whose pose is known, or ``settings.labels`` of them; every other frame
-    may serve as unlabelled source; `take.animation` is the unlabelled target.
+    may serve as unlabelled source; `take.animation` is the unlabelled target. With another label
+    the rest of the draw stays as it was, as far as it can: a model that begins at the one before
+    then knows its frames.
 
     Raises
     ------
@@ -58,20 +60,21 @@ def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
     rng = np.random.default_rng(settings.seed)
     X = take.source.matrix
     usable = np.mean(~np.isnan(X), axis=1) >= MIN_OBSERVED
-    labels = _choose_labels(_usable_labels(take, usable), settings, rng)
+    order = rng.permutation(len(X))
+    count = 0 if take.animation is None else len(take.animation)
+    poses = _draw(rng, np.arange(count), settings.unlabelled)
 
-    others = np.setdiff1d(np.flatnonzero(usable), labels)
-    unlabelled = _draw(rng, others, settings.unlabelled)
+    labels = _choose_labels(_usable_labels(take, usable), settings, rng)
+    others = order[usable[order] & ~np.isin(order, labels)]
+    unlabelled = np.sort(others[: settings.unlabelled])
     filled = _filled(X, np.concatenate([labels, unlabelled]), rng)
-    animation = take.animation
-    assert take.params is not None
-    if animation is None:
-        animation = take.params[:0]
+    assert take.params is not None  # there are labels
+    animation = take.params if take.animation is None else take.animation
     return TrainingSet(
         X_labelled=filled[: len(labels)],
         Y_labelled=take.params[labels],
         X_unlabelled=filled[len(labels) :],
-        Y_unlabelled=animation[_draw(rng, np.arange(len(animation)), settings.unlabelled)],
+        Y_unlabelled=animation[poses],
         frames=labels,
     )
 

@@ -71,6 +71,12 @@ def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
     return replace(found, source=_moved(found.source, turn), up_axis=wanted)
 
 
+def in_metres(units: str) -> float | None:
+    """How many metres a unit is, in any spelling; None for one that is not known, or none."""
+    short = units.strip().lower()
+    return METRES.get(_SPELLINGS.get(short, short))
+
+
 def checked_unit(name: str, field: str) -> str:
     """The short name of a unit in any spelling.
 

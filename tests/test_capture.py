@@ -51,8 +51,8 @@ def test_the_target_is_the_weights_that_drive_the_rig():
 def test_names_without_a_match_are_told(caplog):
     caplog.set_level(logging.INFO)
     simulate_capture(make_rig(), make_performance())
-    assert "1 shapes of the rig rest: extra" in caplog.text
-    assert "1 weights move nothing: HeadYaw" in caplog.text
+    assert "1 shape of the rig without a weight: extra" in caplog.text
+    assert "1 weight without a shape of the rig: HeadYaw" in caplog.text
 
 
 def test_noise_is_a_share_of_the_largest_deviation():

@@ -95,14 +95,14 @@ def test_no_label_is_lost_between_frames(caplog: pytest.LogCaptureFixture) -> No
     found = resampled(posed([11, 40]), 30.0)
     assert found.params[found.labels, 0].tolist() == [11, 40]
     assert abs(found.time[found.labels[0]] - 11 / 60) <= 1 / 60 + 1e-9
-    assert "1 poses moved by up to 17 ms" in caplog.text
+    assert "1 pose moved by up to 17 ms" in caplog.text
 
 
 def test_two_labels_for_one_frame_are_told(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, "facert")
     found = resampled(posed([7, 13, 40]), 5.0)
     assert found.params[found.labels, 0].tolist() == [13, 40]
-    assert "1 poses have no frame near that is free" in caplog.text
+    assert "left out 1 pose without a free frame" in caplog.text
 
 
 def test_a_label_goes_over_no_pause(caplog: pytest.LogCaptureFixture) -> None:
@@ -112,7 +112,7 @@ def test_a_label_goes_over_no_pause(caplog: pytest.LogCaptureFixture) -> None:
     params[[3, 30]] = 1
     found = resampled(make(time, 30.0, controls=Controls(("jaw",)), params=params), 30.0)
     assert found.labels.tolist() == [3]
-    assert "1 poses have no frame near" in caplog.text
+    assert "left out 1 pose without a free frame" in caplog.text
 
 
 def test_a_long_take_has_one_frame_more_than_steps() -> None:

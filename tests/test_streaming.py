@@ -2,11 +2,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import facert
 from facert import InputError, Settings, Source
 from facert.adjustments import Adjustments
+from facert.cleaning.filtering import HEARD
 from facert.handling import AS_IT_IS, Handling
+from facert.streaming import _Finish
 
 
 @pytest.fixture(scope="module")
@@ -171,3 +175,61 @@ def test_frames_at_rest_must_be_there(noisy, retargeter):
         facert.train(noisy, Settings(method="ridge", neutral="500"))
     with pytest.raises(InputError, match="neutral"):
         retargeter.retarget(noisy, handling=Handling(neutral=[500]))
+
+
+def test_what_is_prepared_between_frames_changes_nothing_but_the_time_it_takes(retargeter, noisy):
+    """The noise is measured there as well, once in so many frames."""
+    one, other = (retargeter.stream(noisy.source.names, noisy.fps) for _ in range(2))
+    for frame in noisy.source.values:
+        prepared, plain = one.step(frame), other.step(frame)
+        one.prepare(), one.prepare()
+        np.testing.assert_array_equal(prepared.params, plain.params)
+        np.testing.assert_array_equal(prepared.std, plain.std)
+
+
+def test_std_and_source_are_those_of_their_own_frame_whenever_asked_for(retargeter, noisy):
+    frames, names = noisy.source.values[:30], noisy.source.names
+    late = retargeter.stream(names, noisy.fps)
+    at_once = retargeter.stream(names, noisy.fps)
+    kept = [late.step(frame) for frame in frames]
+    expected = [(one.std, one.source) for one in map(at_once.step, frames)]
+    for one, (std, source) in zip(kept, expected, strict=True):
+        np.testing.assert_array_equal(one.std, std)
+        np.testing.assert_array_equal(one.source, source)
+
+
+@given(
+    st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4),
+    st.lists(st.tuples(st.floats(-2.0, 0.5), st.floats(0.5, 2.0)), min_size=4, max_size=4),
+    st.booleans(),
+)
+def test_single_poses_are_finished_as_all_are(retargeter, gain, limits, bounded):
+    adjustments = Adjustments(np.array(gain), np.array(limits), np.ones(4))
+    model = replace(retargeter, bounds=retargeter.bounds if bounded else None)
+    Y = 5.0 * np.random.default_rng(0).normal(size=(20, 4))
+    params, std = model.finished(Y, np.abs(Y), adjustments)
+    finish = _Finish(model, adjustments)
+    np.testing.assert_allclose([finish.params(y) for y in Y], params, atol=1e-12)
+    np.testing.assert_allclose([finish.spread(y[None]) for y in np.abs(Y)], std, atol=1e-12)
+
+
+def test_a_stream_may_learn_later_where_the_actor_rests(retargeter, noisy):
+    shift = np.random.default_rng(1).normal(size=noisy.source.values.shape[1:])
+    rest = retargeter.neutral.reshape(-1, 3) + shift
+    rest[3] = np.nan  # not known: that marker is not moved
+    shift[3] = 0.0
+    late, known = retargeter.stream(noisy.source.names), retargeter.stream(noisy.source.names)
+    late.calibrate(rest)
+    for frame in noisy.source.values[:20]:
+        expected = known.step(frame).params
+        np.testing.assert_allclose(late.step(frame + shift).params, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("louder", [3.0, 10.0])
+def test_when_another_noise_is_heard_the_source_goes_on_where_it_is(retargeter, truth, louder):
+    scale = louder * 0.05 * truth.source.matrix.std(axis=0).max()
+    noise = scale * np.random.default_rng(1).normal(size=truth.source.values.shape)
+    values = truth.source.values + noise
+    stream = retargeter.stream(truth.source.names, truth.fps)
+    errors = np.array([stream.step(frame).source for frame in values]) - truth.source.values
+    assert rms(errors[HEARD:]) < 1.1 * rms(errors[10:HEARD])

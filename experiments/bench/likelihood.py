@@ -54,7 +54,7 @@ def ours(problem: Problem) -> Call:
 
 
 def lapack_alone(problem: Problem) -> Call:
-    """The calls that `facert.gp.lapack` makes, and nothing between them."""
+    """What LAPACK and BLAS have for it, and nothing between their calls."""
     Z, n = problem.Z, len(problem.Z)
     squared = np.sum((Z[:, None] - Z) ** 2, axis=-1)
     K = np.asfortranarray(VARIANCE * np.exp(-0.5 * INVERSE_WIDTH * squared) + NOISE * np.eye(n))

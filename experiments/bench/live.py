@@ -1,6 +1,6 @@
 """Live Link Face in, VMC out, over loopback between three processes: frames lost, latency, memory.
 
-python -m experiments.bench.live [--seconds 600] [--rate 120] [--record]
+python -m experiments.bench.live [--seconds 600] [--rate 120 60] [--record]
 
 Latency *inside* is what `facert live` says of itself: from a packet's arrival in the process until
 its pose is sent. *End to end* is from the sender's call until the receiver has read the last packet
@@ -134,40 +134,43 @@ class Memory(threading.Thread):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--rate", type=float, default=120.0)
+    parser.add_argument("--rate", type=float, nargs="+", default=[120.0])
     parser.add_argument("--record", action="store_true", help="record what comes in and goes out")
     asked = parser.parse_args()
-    count = round(asked.seconds * asked.rate)
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as engine,
-    ):
+    with tempfile.TemporaryDirectory() as folder:
         take, model = phone_take(), Path(folder) / "model.safetensors"
         train(take, Settings(unlabelled=100)).save(model)
+        for rate in asked.rate:
+            records = f"{folder}/{rate:g}"
+            files = ["--record", f"{records}-in.h5", "--out", f"h5:{records}-out.h5"]
+            measure(model, take, rate, asked.seconds, files if asked.record else [])
+
+
+def measure(model: Path, take: Take, rate: float, seconds: float, options: list[str]) -> None:
+    """A performance of so many seconds, and what became of its frames."""
+    count = round(seconds * rate)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as engine:
         engine.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**22)
         engine.bind(("127.0.0.1", 0))
-        files = ["--record", f"{folder}/in.h5", "--out", f"h5:{folder}/out.h5"]
-        with session(model, engine.getsockname()[1], files if asked.record else []) as running:
+        with session(model, engine.getsockname()[1], options) as running:
             sent = multiprocessing.Array("d", count)
             phone = multiprocessing.Process(
-                target=play, args=(running.port, take.source.values, asked.rate, sent)
+                target=play, args=(running.port, take.source.values, rate, sent)
             )
             memory = Memory(running)
             memory.start()
             phone.start()
-            arrived = listen(engine, asked.rate, count)
+            arrived = listen(engine, rate, count)
             phone.join()
             held = np.array(memory.found)  # before files are written
             running.process.send_signal(signal.SIGINT)
             told = json.loads(running.process.communicate()[0])
-    tell(asked, told, 1e3 * (arrived - np.array(sent)), held)
+    tell(rate, told, 1e3 * (arrived - np.array(sent)), held)
 
 
-def tell(
-    asked: argparse.Namespace, told: dict[str, Any], delays: FloatArray, memory: FloatArray
-) -> None:
+def tell(rate: float, told: dict[str, Any], delays: FloatArray, memory: FloatArray) -> None:
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
-    print(f"{len(delays)} frames at {asked.rate:g}/s, {load}")
+    print(f"{len(delays)} frames at {rate:g}/s, {load}")
     counted = ", ".join(
         f"{name} {told[name]}"
         for name in ("received", "mapped", "dropped", "late", "bad", "failed")

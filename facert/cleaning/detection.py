@@ -25,6 +25,7 @@ import numpy as np
 from facert.cleaning.interpolation import interpolated
 from facert.data import BoolArray, FloatArray, IntArray, Source, Take
 from facert.gaps import Gaussian
+from facert.remembering import remembered
 
 log = logging.getLogger(__name__)
 
@@ -80,6 +81,7 @@ class Faults:
         return Source(np.where(mask, np.nan, source.values), source.names)
 
 
+@remembered
 def find_faults(source: Source) -> Faults:
     """Bad markers of a take.
 

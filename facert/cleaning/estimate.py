@@ -11,6 +11,7 @@ from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
 from facert.data import FloatArray, IntArray
 from facert.normalisation import STILL, Normalisation
+from facert.remembering import remembered
 from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
@@ -61,6 +62,7 @@ class Estimate:
         return largest_step(self.frames)
 
 
+@remembered
 def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Estimate:
     """The joint estimate of all frames, see `facert.cleaning.motion`.
 

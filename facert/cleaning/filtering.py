@@ -6,10 +6,13 @@ is left over is taken to vary more, until it no longer surprises (as adaptive fi
 1970), and new motion passes.
 
 How sure the filter is of the factors depends on what was observed and not on where: as long as
-frames show the same markers, the gain settles and need not be computed again.
+frames show the same markers, the gain settles and need not be computed again. All that can be told
+of a frame before it comes is told by `look_ahead`, in the time between two frames.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,8 +35,13 @@ FAR, GROSS = 6.0, 1.0
 frame: nothing moves so far so quickly, but bad markers do."""
 HEARD = 120
 """Frames that noise is measured in."""
+MISHEARD = 2.0
+"""Change of the noise's variance, as a factor, after which what was learned with it is void."""
 SETTLED = 1e-4
 """Relative change of the covariance in a frame below which it is taken to have settled."""
+
+Seen = BoolArray | None
+"""Which columns (d,) were observed; None: all."""
 
 
 class MotionFilter:
@@ -52,32 +60,77 @@ class MotionFilter:
         self._shared = _FactorFilter(motion.seen_with(sigma), motion.rates)
         rest = np.maximum(motion.rest, max(LEAST_REST * sigma**2, LEAST_VARIANCE))
         self._rest = _SeriesFilter(rest, motion.rest_rates, sigma**2)
-        self._begun = False
-        self._was_off: BoolArray = np.zeros(len(rest), dtype=np.bool_)
+        self._begun = self._looked = False
+        self._was_off: Seen = None
 
     def hear(self, sigma: float) -> None:
         """Go on with another noise."""
         self._shared.hear(self._motion.seen_with(sigma))
-        self._rest.noise = sigma**2
+        self._rest.hear(sigma**2)
+        self._looked = False
 
-    def step(self, frame: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance (d,) of one more normalised frame (d,); NaN: not observed."""
-        seen = ~np.isnan(frame) & ~self._spikes(frame)
-        mean, variance = self._shared.step(frame, seen)
-        rest, doubt = self._rest.step(np.where(seen, frame - mean, 0.0), seen)
-        self._begun = True
-        return mean + rest, variance + doubt
+    def look_ahead(self) -> None:
+        """Foretell the next frame; `step` does it where nobody did."""
+        if not self._looked:
+            self._shared.look_ahead()
+            self._rest.look_ahead()
+            self._looked = True
 
-    def _spikes(self, frame: FloatArray) -> BoolArray:
-        """What is far off for the first time; the second time, it is there."""
+    def step(self, frame: FloatArray, seen: Seen = None) -> FloatArray:
+        """The mean (d,) of one more normalised frame (d,), of which `seen` tells what counts."""
+        self.look_ahead()
+        seen = self._believed(frame, seen)
+        mean = self._shared.step(frame, seen)
+        rest = self._rest.step(frame - mean, seen)
+        self._begun, self._looked = True, False
+        return mean + rest
+
+    @property
+    def variance(self) -> FloatArray:
+        """Of the latest mean, (d,)."""
+        return self._shared.variance + self._rest.variance
+
+    def _believed(self, frame: FloatArray, seen: Seen) -> Seen:
+        """What was seen, but for what is far off for the first time; the second, it is there."""
         if not self._begun:
-            return self._was_off
+            return seen
         shared, rest = self._shared, self._rest
-        off = np.abs(frame - shared.expected - rest.expected)
+        off = np.abs(frame - (shared.expected + rest.expected))
+        was_off, self._was_off = self._was_off, None
+        if not (off > GROSS).any():  # never where NaN
+            return seen
         spread = np.sqrt(shared.variance + rest.foretold)
-        is_off = np.asarray(off > np.maximum(FAR * spread, GROSS))  # never where NaN
-        spikes, self._was_off = is_off & ~self._was_off, is_off
-        return spikes
+        self._was_off = np.asarray(off > np.maximum(FAR * spread, GROSS))
+        is_new = self._was_off if was_off is None else self._was_off & ~was_off
+        return ~is_new if seen is None else seen & ~is_new
+
+
+@dataclass(frozen=True, eq=False)
+class _Update:
+    """What a frame that shows some columns does to the factors, wherever they are.
+
+    Parameters
+    ----------
+    seen : array, shape (d,), or None
+    gain : array, shape (2 q, d)
+    P : array, shape (2 q, 2 q)
+        The covariance after the frame.
+    variance : array, shape (d,)
+        Of what the factors then make of each column.
+    settled : bool
+        Whether another such frame will do the same.
+    """
+
+    seen: Seen
+    gain: FloatArray
+    P: FloatArray
+    variance: FloatArray
+    settled: bool
+
+    def is_for(self, seen: Seen) -> bool:
+        if seen is None or self.seen is None:
+            return seen is self.seen
+        return np.array_equal(seen, self.seen)
 
 
 class _FactorFilter:
@@ -85,99 +138,138 @@ class _FactorFilter:
 
     def __init__(self, factors: Factors, rates: FloatArray) -> None:
         self._factors = factors
-        q = factors.count
+        q, d = factors.count, len(factors.mean)
         blocks = transition(rates)
         self._F = np.block([[np.diag(block) for block in row] for row in blocks])
         self._Q = np.eye(2 * q) - self._F @ self._F.T
-        self._m, self._P = np.zeros(2 * q), np.eye(2 * q)
-        self._seen: BoolArray = np.zeros(0, dtype=np.bool_)
-        self._settled = False
-        self.variance: FloatArray = np.zeros(len(factors.mean))
+        self._m = self._m_ahead = np.zeros(2 * q)
+        start = _Update(None, np.zeros((2 * q, d)), np.eye(2 * q), np.zeros(d), settled=False)
+        self._last = self._next = start
+        self.expected = factors.mean
+        """The next frame, (d,), before it is seen."""
+
+    @property
+    def variance(self) -> FloatArray:
+        """Of the latest mean, (d,)."""
+        return self._last.variance
 
     def hear(self, factors: Factors) -> None:
         """Go on with another noise."""
-        self._factors, self._settled = factors, False
+        self._factors, self._last = factors, replace(self._last, settled=False)
 
-    @property
-    def expected(self) -> FloatArray:
-        """The next frame, (d,), before it is seen."""
-        return self._factors.frames((self._F @ self._m)[: self._factors.count])
+    def look_ahead(self) -> None:
+        """Foretell the next frame, and what it will do if it shows what the last one did."""
+        factors, last = self._factors, self._last
+        self._m_ahead = self._F @ self._m
+        self.expected = factors.mean + factors.weights @ self._m_ahead[: factors.count]
+        self._next = last if last.settled else self._update(last.seen)
 
-    def step(self, frame: FloatArray, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance (d,) of what the factors make of a frame."""
-        m = self._F @ self._m
-        if not (self._settled and np.array_equal(seen, self._seen)):
-            self._update(seen)
-        factors, q = self._factors, self._factors.count
-        residual = np.where(seen, frame - factors.frames(m[:q]), 0.0)
-        self._m = m + self._gain @ residual
-        return factors.frames(self._m[:q]), self.variance
+    def step(self, frame: FloatArray, seen: Seen) -> FloatArray:
+        """What the factors make of a frame, (d,)."""
+        if not self._next.is_for(seen):
+            self._next = self._update(seen)
+        self._last = self._next
+        change = self._last.gain @ _known(frame - self.expected, seen)
+        self._m = self._m_ahead + change
+        return np.asarray(self.expected + self._factors.weights @ change[: self._factors.count])
 
-    def _update(self, seen: BoolArray) -> None:
-        """The gain, and the covariance after this frame."""
-        factors, q = self._factors, self._factors.count
-        trusted = factors.weights * (seen / factors.noise)[:, None]
+    def _update(self, seen: Seen) -> _Update:
+        factors, q, before = self._factors, self._factors.count, self._last.P
+        trust = 1.0 / factors.noise if seen is None else seen / factors.noise
+        trusted = factors.weights * trust[:, None]
         precision = factors.weights.T @ trusted
-        P = self._F @ self._P @ self._F.T + self._Q
+        P = self._F @ before @ self._F.T + self._Q
         pulled = P[:, :q] @ np.linalg.inv(np.eye(q) + precision @ P[:q, :q])
-        self._gain = pulled @ trusted.T
         after = P - pulled @ precision @ P[:q]
         after = (after + after.T) / 2.0
-        change = np.abs(np.diag(after) - np.diag(self._P)).max()
-        self._settled = bool(change < SETTLED * np.diag(after).min())
-        self._P, self._seen = after, seen
-        self.variance = factors.variance(after[None, :q, :q])[0]
+        change = np.abs(after.diagonal() - before.diagonal()).max()
+        return _Update(
+            seen,
+            gain=pulled @ trusted.T,
+            P=after,
+            variance=factors.variance(after[None, :q, :q])[0],
+            settled=bool(change < SETTLED * after.diagonal().min()),
+        )
 
 
 class _SeriesFilter:
-    """Of independent series with their velocities, see `smoothing.smooth_series`; adaptive."""
+    """Of independent series with their velocities, see `smoothing.smooth_series`; adaptive.
+
+    Covariances (3, d) are those of value, value with velocity, and velocity.
+    """
 
     def __init__(self, variance: FloatArray, rates: FloatArray, noise: float) -> None:
         F = transition(rates)
-        self._F, self.noise = F, noise
+        self._F, self._noise = F, noise
         self._forward = forward_covariance(F)
         prior = np.stack([variance, np.zeros_like(variance), variance])
         self._drift = prior - (self._forward * prior).sum(axis=1)
-        self._m, self._P = np.zeros((2, len(variance))), prior
-        self._width = np.ones_like(variance)
-        self._found = self._foretold = variance + noise
+        self._prior = prior
+        self._m = self._m_ahead = np.zeros((2, len(variance)))
+        self._begin()
+
+    def _begin(self) -> None:
+        """As sure as before the first frame, of what is where it is and at rest."""
+        self._m = self._m * [[1.0], [0.0]]
+        # Of the latest frame: the covariance before it was seen, and the gain.
+        self._P, self._gain = self._prior, np.zeros_like(self._m)
+        self._P_ahead = self._prior
+        self._width = np.ones_like(self._prior[0])
+        self._found = self._foretold = self._prior[0] + self._noise
 
     @property
     def expected(self) -> FloatArray:
         """The next values, (d,), before they are seen."""
-        return np.asarray(self._F[0, 0] * self._m[0] + self._F[0, 1] * self._m[1])
+        return np.asarray(self._m_ahead[0])
 
     @property
     def foretold(self) -> FloatArray:
         """Their variance, with the noise, (d,)."""
-        return np.asarray(self._ahead()[0] + self.noise)
+        return np.asarray(self._P_ahead[0] + self._noise)
 
-    def step(self, values: FloatArray, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance (d,) after one more value of each."""
-        m = self._F[:, 0] * self._m[0] + self._F[:, 1] * self._m[1]
-        P = self._ahead()
-        surprise = np.where(seen, values - m[0], 0.0)
-        P = P * self._widened(surprise, P[0], seen)
-        gain = P[:2] * (seen / (P[0] + self.noise))
-        self._m = m + gain * surprise
-        self._P = P - np.stack([gain[0] * P[0], gain[0] * P[1], gain[1] * P[1]])
-        return self._m[0], self._P[0]
+    @property
+    def variance(self) -> FloatArray:
+        """Of the latest mean, (d,)."""
+        return np.asarray(self._P[0] * (1.0 - self._gain[0]))
 
-    def _ahead(self) -> FloatArray:
-        """The covariance (3, d) of value and velocity in the next frame."""
-        ahead: FloatArray = (self._forward * self._P).sum(axis=1) + self._width * self._drift
-        return ahead
+    def hear(self, noise: float) -> None:
+        """Go on with another variance of the noise."""
+        before, self._noise = self._noise, noise
+        self._foretold = self._foretold + (noise - before)
+        if not before / MISHEARD < noise < before * MISHEARD:
+            self._begin()  # what was learned took noise for motion, or motion for noise
 
-    def _widened(self, surprise: FloatArray, variance: FloatArray, seen: BoolArray) -> FloatArray:
+    def look_ahead(self) -> None:
+        """Foretell the next values."""
+        m, P = self._m, self._P - self._gain[[0, 0, 1]] * self._P[[0, 1, 1]]
+        self._m_ahead = self._F[:, 0] * m[0] + self._F[:, 1] * m[1]
+        self._P_ahead = (self._forward * P).sum(axis=1) + self._width * self._drift
+
+    def step(self, values: FloatArray, seen: Seen) -> FloatArray:
+        """The mean (d,) after one more value of each."""
+        surprise = _known(values - self._m_ahead[0], seen)
+        self._P = P = self._P_ahead * self._widened(surprise, seen)
+        gain = P[:2] / (P[0] + self._noise)
+        self._gain = gain if seen is None else gain * seen
+        self._m = self._m_ahead + self._gain * surprise
+        return np.asarray(self._m[0])
+
+    def _widened(self, surprise: FloatArray, seen: Seen) -> FloatArray:
         """How much wider than so far each is taken to vary, after this surprise."""
-        fresh = (1.0 - MEMORY) * seen
-        self._found = self._found + fresh * (surprise**2 - self._found)
-        self._foretold = self._foretold + fresh * (variance + self.noise - self._foretold)
-        ratio = (self._found - self.noise) / (self._foretold - self.noise)
+        fresh = 1.0 - MEMORY if seen is None else (1.0 - MEMORY) * seen
+        self._found = self._found + fresh * (surprise * surprise - self._found)
+        self._foretold = self._foretold + fresh * (self.foretold - self._foretold)
+        ratio = (self._found - self._noise) / (self._foretold - self._noise)
+        change = np.minimum(np.maximum(ratio, FALL), RISE)  # np.clip takes three times as long
         before = self._width
-        change = np.where(seen, np.clip(ratio, FALL, RISE), 1.0)
-        self._width = np.clip(before * change, 1.0, MOST)
-        return self._width / before
+        widened = before * (change if seen is None else np.where(seen, change, 1.0))
+        self._width = np.minimum(np.maximum(widened, 1.0), MOST)
+        return np.asarray(self._width / before)
+
+
+def _known(values: FloatArray, seen: Seen) -> FloatArray:
+    """Values (d,), 0 where they were not seen."""
+    return values if seen is None else np.where(seen, values, 0.0)
 
 
 class NoiseMeter:

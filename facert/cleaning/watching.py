@@ -12,21 +12,29 @@ positions repeat now and then as well."""
 
 
 class MarkerWatch:
-    """Hides markers at exactly (0, 0, 0), and held ones."""
+    """Hides markers at exactly (0, 0, 0), and held ones.
 
-    def __init__(self) -> None:
-        self._last: FloatArray | None = None
-        self._repeats: IntArray = np.zeros(0, dtype=np.int64)
+    Parameters
+    ----------
+    markers : int
+        How many there are.
+    """
+
+    def __init__(self, markers: int) -> None:
+        self._last = np.full((markers, 3), np.nan)
+        self._none: BoolArray = np.zeros(markers, dtype=np.bool_)
+        self._repeats: IntArray = np.zeros(markers, dtype=np.int64)
 
     def step(self, markers: FloatArray) -> BoolArray:
         """Which markers (M,) of one more frame (M, 3) are bad; NaN: not observed."""
+        repeated, last = markers == self._last, self._last
+        self._last = np.where(np.isnan(markers), last, markers)
+        if markers.all() and not repeated.any():  # as nearly always
+            self._repeats = np.zeros_like(self._repeats)
+            return self._none
         zero = (markers == 0.0).all(axis=1)
-        if self._last is None:
-            self._last, self._repeats = markers.copy(), np.zeros(len(markers), dtype=np.int64)
-            return np.asarray(zero)
-        seen = ~np.isnan(markers[:, 0])
-        same = seen & (markers == self._last).all(axis=1)
-        whole = same.sum() > seen.sum() / 2  # the whole frame is a repeat, or the face rests
+        same = repeated.all(axis=1)
+        whole = same.sum() > np.count_nonzero(~np.isnan(markers[:, 0])) / 2
+        # Of a whole frame that is a repeat nothing is told: it was sent twice, or the face rests.
         self._repeats = np.where(same, self._repeats + (not whole), 0)
-        self._last = np.where(seen[:, None], markers, self._last)
         return np.asarray(zero | (same & (self._repeats >= HELD)))

@@ -37,9 +37,18 @@ from facert.cli import (
 )
 from facert.errors import FacertError
 
+ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")
+
 
 class _Commands(TyperGroup):
     """Typer ends without a word at Ctrl-C; the exit status is the one that shells expect."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Let the options about messages stand after the command as well as before it."""
+        own = args[: args.index("--")] if "--" in args else args
+        moved = [arg for arg in own if arg in ABOUT_MESSAGES]
+        rest = [arg for arg in own if arg not in ABOUT_MESSAGES]
+        return super().parse_args(ctx, [*moved, *rest, *args[len(own) :]])
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for."""
@@ -74,7 +83,7 @@ def options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Options before the command."""
+    """Options before or after the command."""
     console.configure(quiet, verbose)
 
 

@@ -27,13 +27,23 @@ class Plan:
     pairs : tuple of (Path, Path)
     many : bool
         Whether a folder was asked for: failures are then told line by line.
+    jobs : int
+        Files at a time; 0: as many as there are processor cores.
     """
 
     pairs: tuple[tuple[Path, Path], ...]
     many: bool
+    jobs: int = 1
 
 
-def plan(paths: Sequence[Path], out_dir: Path | None, ending: str, overwrite: bool) -> Plan:
+def plan(
+    paths: Sequence[Path],
+    out_dir: Path | None,
+    ending: str | None,
+    jobs: int | None,
+    overwrite: bool,
+    endings: tuple[str, ...] = (),
+) -> Plan:
     """What to do.
 
     Parameters
@@ -42,9 +52,13 @@ def plan(paths: Sequence[Path], out_dir: Path | None, ending: str, overwrite: bo
         IN and OUT; or with `out_dir` any number of files, and folders whose takes are all meant.
     out_dir : Path or None
         Each result goes here, named after its source.
-    ending : str
-        Of the results in `out_dir`, e.g. ``".h5"``.
+    ending : str, optional
+        Of the results in `out_dir`; by default ``".h5"``.
+    jobs : int, optional
+        Files at a time in `out_dir`; by default one, 0 as many as there are processor cores.
     overwrite : bool
+    endings : tuple of str
+        What results may end in; by default what takes can be written to.
 
     Raises
     ------
@@ -54,13 +68,10 @@ def plan(paths: Sequence[Path], out_dir: Path | None, ending: str, overwrite: bo
         For a single OUT that exists.
     """
     if out_dir is None:
-        if len(paths) != 2:
-            raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
-        if paths[1].exists() and not overwrite:
-            raise OutputExistsError(paths[1])
-        return Plan(((paths[0], paths[1]),), many=False)
+        return _single(paths, ending, jobs, overwrite, endings)
     sources = [file for path in paths for file in _files(path)]
-    outputs = [out_dir / (_stem(source) + ending) for source in sources]
+    outputs = [out_dir / (_stem(source) + (ending or ".h5")) for source in sources]
+    _require_ending(outputs[0], endings)
     twice = [name for name in outputs if outputs.count(name) > 1]
     if twice:
         raise InputError(
@@ -73,10 +84,38 @@ def plan(paths: Sequence[Path], out_dir: Path | None, ending: str, overwrite: bo
             "--out-dir", "another folder than that of the takes", str(lost[0]), "Give another."
         )
     out_dir.mkdir(parents=True, exist_ok=True)
-    return Plan(tuple(zip(sources, outputs, strict=True)), many=True)
+    return Plan(tuple(zip(sources, outputs, strict=True)), True, 1 if jobs is None else jobs)
 
 
-def carry_out(todo: Plan, work: Work, jobs: int, overwrite: bool) -> None:
+def _single(
+    paths: Sequence[Path],
+    ending: str | None,
+    jobs: int | None,
+    overwrite: bool,
+    endings: tuple[str, ...],
+) -> Plan:
+    """One file, IN to OUT."""
+    if len(paths) != 2:
+        raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
+    for option, given in (("--ending", ending), ("--jobs", jobs)):
+        if given is not None:
+            raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
+    _require_ending(paths[1], endings)
+    if paths[1].exists() and not overwrite:
+        raise OutputExistsError(paths[1])
+    return Plan(((paths[0], paths[1]),), many=False)
+
+
+def _require_ending(output: Path, endings: tuple[str, ...]) -> None:
+    """Refuse a result that cannot be written, before any work is done."""
+    from facert.io.formats import TAKE_OUTPUTS, unknown_output
+
+    known = endings or TAKE_OUTPUTS
+    if not output.name.lower().endswith(known):
+        raise unknown_output(output, ", ".join(known))
+
+
+def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
     """Do it, several files at a time if asked; ends the command with status 1 if any failed."""
     if not todo.many:
         (pair,) = todo.pairs
@@ -87,7 +126,7 @@ def carry_out(todo: Plan, work: Work, jobs: int, overwrite: bool) -> None:
         if (source, output) not in wanted:
             _tell("exists", f"{source}: {output} is there; --overwrite makes it anew")
     failed = 0
-    for source, error in _outcomes(wanted, work, jobs):
+    for source, error in _outcomes(wanted, work, todo.jobs):
         failed += error is not None
         _tell("failed" if error else "done", error or str(source))
     if failed:

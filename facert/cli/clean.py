@@ -10,7 +10,7 @@ import typer
 
 from facert.cli import console
 from facert.cli.batch import carry_out, plan
-from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR, SIGMA
+from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGMA, TARGET
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -34,13 +34,11 @@ def command(
     ] = None,
     no_detect: NO_DETECT = False,
     sigma: SIGMA = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
+    target: TARGET = None,
     out_dir: OUT_DIR = None,
-    ending: ENDING = ".h5",
-    jobs: JOBS = 1,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    ending: ENDING = None,
+    jobs: JOBS = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Fill gaps in markers or weights, and remove noise.
 
@@ -48,7 +46,7 @@ def command(
     deviation for every value as /source/std, and /source/filled tells what had
     not been observed. What was never observed stays open.
     """
-    todo = plan(paths, out_dir, ending, overwrite)
+    todo = plan(paths, out_dir, ending, jobs, overwrite)
     work = partial(
         _clean,
         model=model,
@@ -57,7 +55,7 @@ def command(
         target=target,
         overwrite=overwrite,
     )
-    carry_out(todo, work, jobs, overwrite)
+    carry_out(todo, work, overwrite)
 
 
 def _clean(

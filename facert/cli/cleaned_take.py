@@ -18,9 +18,9 @@ def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:
     """Read a take, without its bad markers unless they are to be believed."""
     from facert.cleaning.detection import without_faults
     from facert.errors import reading
-    from facert.io.formats import read_take_file
+    from facert.io.formats import read_source_file
 
-    take = read_take_file(path, target)
+    take = read_source_file(path, target)
     with reading(path):
         return take if no_detect else without_faults(take)
 

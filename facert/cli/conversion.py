@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.conversion import Changes, converted
+from facert.conversion import Changes, converted, in_space
 from facert.data import Rig, Take
 from facert.errors import InputError, OutputExistsError, reading
 from facert.io import formats, usd
@@ -16,10 +17,14 @@ from facert.io.glb import write_glb
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
 from facert.labelling import weights_as_poses
 from facert.morphs import Morphs, compact_morphs, rig_morphs
+from facert.units import in_metres
 from facert.view.faces import control_settings
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.io.formats import Kind
+
+log = logging.getLogger("facert")
 
 MORPH_ENDINGS = (".glb", *usd.ENDINGS)
 ENDINGS = (*formats.HDF5_ENDINGS, ".livelink.csv", ".csv", ".json", *MORPH_ENDINGS)
@@ -70,12 +75,21 @@ def convert_file(
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
         if output.suffix.lower() in MORPH_ENDINGS:
-            return _write_motion(_motion(found, wanted), output, overwrite)
+            return _write_motion(_motion(found, wanted, changes), output, overwrite)
     formats.write_take_file(found, output, overwrite)
-    return (
-        f"a take with {len(found)} frames of {len(found.source.names)} {found.source.kind}"
-        f" and {len(found.labels)} poses"
-    )
+    return _content(found, output)
+
+
+def _content(take: Take, output: Path) -> str:
+    """What of a take its file holds: all, or the poses, or else the source."""
+    frames = plural(len(take), "frame")
+    source = plural(len(take.source.names), take.source.kind[:-1])
+    poses = plural(len(take.labels), "pose")
+    if output.suffix.lower() in formats.HDF5_ENDINGS:
+        return f"a take with {frames} of {source} and {poses}"
+    if take.controls is None or take.params is None:
+        return f"{frames} of {source}"
+    return f"{poses} of {plural(len(take.controls.names), 'control')}"
 
 
 def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take | Rig:
@@ -99,11 +113,13 @@ def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: b
     return _write_motion(motion, output, overwrite)
 
 
-def _motion(take: Take, wanted: Wanted) -> _Motion:
+def _motion(take: Take, wanted: Wanted, changes: Changes) -> _Motion:
     """The rig in the poses of a take, or as its tracked weights move it."""
     if wanted.rig is None:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
-    rig = formats.read_rig_file(wanted.rig, wanted.shapes)
+    with reading(wanted.rig):
+        rig = in_space(formats.read_rig_file(wanted.rig, wanted.shapes), changes)
+    assert isinstance(rig, Rig)  # as it went in
     if not len(take.labels) and take.source.kind == "weights":
         take = weights_as_poses(take, rig)
     settings = control_settings(take, rig, range(len(take)))
@@ -117,14 +133,19 @@ def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:
         _write_motion(_Motion(still), output, overwrite)
     else:
         formats.write_rig_file(rig, output, overwrite)
-    return f"a rig with {len(rig.neutral)} vertices and {len(rig.names)} shapes"
+    vertices = plural(len(rig.neutral), "vertex", "vertices")
+    return f"a rig with {vertices} and {plural(len(rig.names), 'shape')}"
 
 
 def _write_motion(motion: _Motion, output: Path, overwrite: bool) -> str:
     morphs = motion.morphs
+    if in_metres(morphs.neutral.units) is None:
+        told = "the mesh has no unit that is known: its numbers are written as metres; where they"
+        log.warning("%s are not, say so: --in-units cm", told)
     if output.suffix.lower() == ".glb":
         write_glb(morphs, output, overwrite)
     else:
         usd.write_usd(morphs, output, motion.fps, motion.up_axis, overwrite)
     error = f", off by {morphs.error:.2g} at most" if morphs.error else ""
-    return f"{len(morphs.time)} frames of {len(morphs.targets)} morph targets{error}"
+    targets = plural(len(morphs.targets), "morph target")
+    return f"{plural(len(morphs.time), 'frame')} of {targets}{error}"

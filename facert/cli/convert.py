@@ -11,7 +11,7 @@ import typer
 
 from facert.cli import console
 from facert.cli.batch import carry_out, plan
-from facert.cli.options import ENDING, JOBS, OUT_DIR
+from facert.cli.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
 
 if TYPE_CHECKING:
     from facert.cli.conversion import Wanted
@@ -43,9 +43,7 @@ def command(
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz track, or animation of a .glb.")
     ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    shapes: SHAPES = None,
     map_path: Annotated[
         Path | None, typer.Option("--map", metavar="TOML", help='New names: theirs = "ours".')
     ] = None,
@@ -74,9 +72,9 @@ def command(
         Path | None, typer.Option("--rig", help="The character's rig, for a take as .glb or .usd.")
     ] = None,
     out_dir: OUT_DIR = None,
-    ending: ENDING = ".h5",
-    jobs: JOBS = 1,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    ending: ENDING = None,
+    jobs: JOBS = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Convert a take, a rig or a mesh sequence to another format.
 
@@ -85,7 +83,7 @@ def command(
     shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
     does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
     """
-    from facert.cli.conversion import Wanted
+    from facert.cli.conversion import ENDINGS, Wanted
     from facert.conversion import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
@@ -101,11 +99,10 @@ def command(
         start_timecode=start_timecode,
     )
     wanted = Wanted(kind.value if kind else None, target, shapes, in_fps or fps, rig_path)
-    todo = plan(paths, out_dir, ending, overwrite)
+    todo = plan(paths, out_dir, ending, jobs, overwrite, ENDINGS)
     carry_out(
         todo,
         partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite),
-        jobs,
         overwrite,
     )
 

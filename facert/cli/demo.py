@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE
 
 
 def command(
@@ -15,7 +16,7 @@ def command(
         Path, typer.Argument(metavar="[DIR]", help="Where to write.", show_default=True)
     ] = Path("facert-demo"),
     seed: Annotated[int, typer.Option(min=0, help="Another seed, other performances.")] = 0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Write a demo: a performance with a few key poses, another to retarget, and both rigs."""
     from facert.demo import write_demo

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import MeshSequence
@@ -66,10 +68,8 @@ def command(
             "More makes fewer targets and a smaller file.",
         ),
     ] = 0.5,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    shapes: SHAPES = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Deform a face in every frame so that its feature points are where POINTS has them.
 
@@ -77,7 +77,7 @@ def command(
     """
     from facert.data import MeshSequence
     from facert.errors import reading
-    from facert.io.formats import read_take_file
+    from facert.io.formats import read_source_file
     from facert.io.mesh import read_mesh
     from facert.io.toml import read_toml
     from facert.topology.driving import FaceDriver, LooseParts
@@ -86,7 +86,7 @@ def command(
     _require_output(output, overwrite)
     if auto and map_path:
         raise typer.BadParameter("give --map or --auto, not both")
-    mesh, take = read_mesh(mesh_path, shapes), read_take_file(points_path)
+    mesh, take = read_mesh(mesh_path, shapes), read_source_file(points_path)
     where: Where = read_toml(map_path) if map_path else "nearest" if auto else "names"
     with reading(points_path):
         points = feature_points(take, mesh, where, rest, fit.value)
@@ -98,8 +98,8 @@ def command(
     )
     said = _write(sequence, output, tolerance / 100.0, overwrite)
     console.out.print(
-        f"{output}: {len(take)} frames of {len(mesh.vertices)} vertices, "
-        f"driven by {len(points.vertices)} points{said}",
+        f"{output}: {plural(len(take), 'frame')} of {len(mesh.vertices)} vertices, "
+        f"driven by {plural(len(points.vertices), 'point')}{said}",
         markup=False,
     )
 
@@ -128,4 +128,5 @@ def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bo
     morphs = compact_morphs(sequence, tolerance)
     write_glb(morphs, output, overwrite)
     unit = f" {sequence.neutral.units}" if sequence.neutral.units else ""
-    return f"; {len(morphs.names)} morph targets, off by {morphs.error:.2g}{unit} at most"
+    targets = plural(len(morphs.names), "morph target")
+    return f"; {targets}, off by {morphs.error:.2g}{unit} at most"

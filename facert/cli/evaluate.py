@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from facert.cli import console
+from facert.cli.options import DEVICE, OVERWRITE, SHAPES, TARGET
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import Take
@@ -32,18 +34,28 @@ class Split(StrEnum):
 def command(
     take: Annotated[
         Path | None,
-        typer.Argument(help="Take with the true pose in all frames; by default the built-in one."),
+        typer.Argument(
+            help="Take with true poses, in all frames or some; by default the built-in one."
+        ),
     ] = None,
     labels: Annotated[
-        str, typer.Option(help="Labelled frames: a..b, a..b:step, or numbers with commas.")
-    ] = "10..40",
+        str | None,
+        typer.Option(
+            help="Labelled frames: a..b, a..b:step, or numbers with commas.",
+            show_default="10..40, fewer where few are posed",
+        ),
+    ] = None,
     methods: Annotated[
         str, typer.Option(help="all, or names with commas, of " + ", ".join(REGISTRY) + ".")
     ] = "all",
     repeats: Annotated[int, typer.Option(min=1, help="Random draws of each.")] = 20,
     unlabelled: Annotated[
-        str, typer.Option(help="Unlabelled frames, and as many poses: one number, range or list.")
-    ] = "100",
+        str | None,
+        typer.Option(
+            help="Unlabelled frames, and as many poses: one number, range or list.",
+            show_default="100, fewer where there are fewer",
+        ),
+    ] = None,
     noise: Annotated[
         float, typer.Option(help="Noise, as a share of the largest deviation of a coordinate.")
     ] = 0.0,
@@ -57,16 +69,13 @@ def command(
     rig: Annotated[
         Path | None, typer.Option(help="The character's rig, for errors of its vertices.")
     ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    shapes: SHAPES = None,
     test_frames: Annotated[
         int | None, typer.Option(help="Test on so many frames at most.", show_default="all")
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
+    target: TARGET = None,
     seed: Annotated[int, typer.Option(help="For every random choice.")] = 0,
+    device: DEVICE = "cpu",
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
     ] = None,
@@ -77,32 +86,28 @@ def command(
     plot: Annotated[
         Path | None, typer.Option(help="Picture of RMS against labels and unlabelled frames.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace existing output files.")
-    ] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Compare methods: draw labels at random, train, and test on the other frames."""
     _require_outputs(json_path, plot, overwrite)
     if across is not None and split is not Split.random:
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
-    from facert.cli.evaluation_run import open_journal, run_cells
+    from facert.cli.evaluation_run import Asked, open_journal, run_cells
     from facert.cli.evaluation_table import error_table
     from facert.cli.pictures import save_picture
     from facert.evaluation.advice import advise
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
-    from facert.evaluation.run import Grid
     from facert.evaluation.summary import summarise
     from facert.io.formats import read_rig_file
-    from facert.ranges import parse_range
+    from facert.methods.device import find_device
+    from facert.settings import Settings
 
-    grid = Grid(
-        methods=_methods(methods),
-        labels=parse_range(labels, "--labels"),
-        unlabelled=parse_range(unlabelled, "--unlabelled"),
-        repeats=repeats,
-    )
+    asked = Asked.of(_methods(methods), labels, unlabelled, repeats)
+    if device != "cpu":
+        find_device(device)
+    settings = Settings(device=device)
     protocol = Protocol(split.value, noise, missing, test_frames, seed)
     with reading(take or BUILT_IN):
         problem = make_problem(
@@ -111,8 +116,9 @@ def command(
             None if across is None else _read(across, target),
             None if rig is None else read_rig_file(rig, shapes),
         )
-        journal = open_journal(problem, json_path)
-        outcomes = run_cells(problem, grid, jobs, journal)
+        grid = asked.grid(problem)
+        journal = open_journal(problem, settings, json_path)
+        outcomes = run_cells(problem, grid, settings, jobs, journal)
     rows = summarise(outcomes, protocol)
     title = _title(_name(take, target), across, problem, grid)
     console.out.print(error_table(rows, title))
@@ -166,7 +172,7 @@ def _name(take: Path | None, target: str | None) -> str:
 def _title(name: str, across: Path | None, problem: Problem, grid: Grid) -> str:
     protocol = problem.protocol
     tested = f"tested on {across.name}" if across is not None else f"{protocol.split} split"
-    parts = [name, tested, f"{grid.repeats} {'draw' if grid.repeats == 1 else 'draws'}"]
+    parts = [name, tested, plural(grid.repeats, "draw")]
     if len(grid.unlabelled) == 1:
         parts.append(f"{grid.unlabelled[0]} unlabelled")
     if protocol.noise:

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from facert.cli import console
 from facert.evaluation.summary import Row, best
+from facert.wording import plural
 
 Column = Callable[[Row], str]
 WIDEST = 160
@@ -78,7 +79,7 @@ def _failures(rows: Sequence[Row]) -> list[str]:
         if row.failure:
             reasons.setdefault((row.labels, row.failure), []).append(row.method)
     return [
-        f"{', '.join(dict.fromkeys(methods))} with {labels} labels: {reason}"
+        f"{', '.join(dict.fromkeys(methods))} with {plural(labels, 'label')}: {reason}"
         for (labels, reason), methods in reasons.items()
     ]
 

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from facert.cli.options import OVERWRITE
+
 
 class Program(StrEnum):
     """Programs that there is a script for."""
@@ -21,7 +23,7 @@ def command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write it here instead of to stdout.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Print a Python script that keys a character with curves (.json or .csv) of facert.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from facert.cli import console
+from facert.cli.options import SHAPES, TARGET
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,12 +19,8 @@ def command(
     path: Annotated[
         Path, typer.Argument(metavar="FILE", help="A take, a rig, a mesh sequence or a model.")
     ],
-    target: Annotated[
-        str | None, typer.Option(help="Which of several targets of an .npz track.")
-    ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    target: TARGET = None,
+    shapes: SHAPES = None,
     as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
 ) -> None:
     """Show what is in a file: units, rates, names, gaps, labels, active channels."""
@@ -45,13 +42,20 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
     from dataclasses import asdict
 
     from facert.inspection import summarise
-    from facert.io.formats import read_any
+    from facert.io.formats import read_any, targets_of
     from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
+    from facert.io.npz import NO_TARGET
 
     if holds_mesh_sequence(path):
         with open_mesh_sequence(path) as sequence:
             return asdict(summarise(sequence))
-    return asdict(summarise(read_any(path, target=target, shapes=shapes, fps=None)))
+    targets = targets_of(path) if target is None else {}
+    found = read_any(path, target=NO_TARGET if targets else target, shapes=shapes, fps=None)
+    facts = asdict(summarise(found))
+    if targets:
+        console.log.info("several targets: --target shows one of them")
+        facts["controls_of_targets"] = {name: len(controls) for name, controls in targets.items()}
+    return facts
 
 
 def _table(title: str, facts: Mapping[str, Any]) -> Table:

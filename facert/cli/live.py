@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
     from facert.retargeter import Retargeter
 
 _Parsed = TypeVar("_Parsed")
+
+PRIORITY = 10
+"""Steps of niceness that a session goes before other programs."""
 
 
 def command(
@@ -66,6 +71,15 @@ def command(
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
     sigma: SIGMA = None,
+    neutral: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            max=60.0,
+            metavar="SECONDS",
+            help="The actor rests for so long at first; that makes up for another day's markers.",
+        ),
+    ] = None,
     record: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Take of what comes in: .h5, .csv, .livelink.csv."),
@@ -109,13 +123,16 @@ def command(
                 no_smooth=no_smooth,
                 sigma=sigma,
             )
-            mapping = LiveModel(file, retargeter, pattern, receiver.fps, handling)
-            stack.enter_context(mapping)
-        session = Session(receiver, mapping.step, senders, files, kept)
+            mapper = LiveModel(file, retargeter, pattern, receiver.fps, handling, neutral)
+            stack.enter_context(mapper)
+        session = Session(receiver, mapper, senders, files, kept)
         stopped = stack.enter_context(_stopping())
         stack.enter_context(_settled())
+        stack.enter_context(_first())
         status = stack.enter_context(Status(session))
         _announce(begin, listen, receiver)
+        if neutral is not None:
+            _announce_rest(neutral, retargeter)
         try:
             session.run(Limits.of(frames, seconds), stopped, status.show)
         finally:  # a performance is not to be had again
@@ -175,6 +192,17 @@ def _announce(begin: Address | File, listen: str, receiver: Receiver) -> None:
         console.log.info("listens for %s on %s", begin.kind, place)
 
 
+def _announce_rest(seconds: float, retargeter: Retargeter) -> None:
+    console.log.info(
+        "the actor rests for %g s; poses are sent meanwhile, but are not calibrated yet", seconds
+    )
+    if retargeter.settings.neutral is None:
+        console.log.warning(
+            "the model does not know the actor at rest and takes the smallest pose for it: "
+            "train with --neutral as well"
+        )
+
+
 @contextmanager
 def _stopping() -> Iterator[Callable[[], bool]]:
     """Let Ctrl-C, and a request to end, stop the session; a second Ctrl-C stops at once."""
@@ -192,6 +220,24 @@ def _stopping() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def _first() -> Iterator[None]:
+    """Let this thread go before other programs, where the system allows it.
+
+    A packet that is sent wakes its receiver, which would else go first until the next one is sent.
+    """
+    taken = False
+    if sys.platform != "win32":
+        with suppress(OSError):
+            os.nice(-PRIORITY)
+            taken = True
+    try:
+        yield
+    finally:
+        if taken:
+            os.nice(PRIORITY)
 
 
 @contextmanager

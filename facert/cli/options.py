@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from facert.handling import Handling
     from facert.retargeter import Retargeter
 
+TARGET = Annotated[
+    str | None, typer.Option("--target", help="Which target of an .npz take that has several.")
+]
+SHAPES = Annotated[
+    str | None, typer.Option("--shapes", help="Which of several sets of shapes of an .npz rig.")
+]
+OVERWRITE = Annotated[bool, typer.Option("--overwrite", help="Replace existing output files.")]
 CONTROLS = Annotated[
     Path | None,
     typer.Option(
@@ -33,10 +40,29 @@ OUT_DIR = Annotated[
     typer.Option("--out-dir", help="Folder for the results of several takes, named after them."),
 ]
 ENDING = Annotated[
-    str, typer.Option("--ending", help="Of the files in --out-dir, which tells their format.")
+    str | None,
+    typer.Option(
+        "--ending",
+        help="Of the files in --out-dir, which tells their format.",
+        show_default=".h5",
+    ),
 ]
 JOBS = Annotated[
-    int, typer.Option("--jobs", "-j", min=0, help="Takes at a time; 0: one a processor core.")
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        min=0,
+        help="Takes at a time in --out-dir; 0: one a processor core.",
+        show_default="1",
+    ),
+]
+
+DEVICE = Annotated[
+    str,
+    typer.Option(
+        "--device", help="Where the shared models compute: cpu or cuda; all others stay on the CPU."
+    ),
 ]
 
 

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, TARGET
+from facert.wording import plural
 
 
 def command(
@@ -19,10 +21,8 @@ def command(
     controls: Annotated[
         str, typer.Option(help="For instance smile,jaw_open; by default the most varying.")
     ] = "",
-    target: Annotated[
-        str | None, typer.Option(help="Which of several targets of .npz takes.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
+    target: TARGET = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Draw controls over time, with their uncertainty and the truth."""
     from facert.cli.pictures import require_picture_name, save_picture
@@ -37,4 +37,4 @@ def command(
     with reading(take_path):
         figure = plot_controls(take, truth, names)
     save_picture(figure, output, overwrite)
-    console.out.print(f"{output}: {len(figure.axes)} controls", markup=False)
+    console.out.print(f"{output}: {plural(len(figure.axes), 'control')}", markup=False)

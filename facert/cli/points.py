@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES
+from facert.wording import plural
 
 app = typer.Typer(help="Feature points of a face.", no_args_is_help=True)
 
@@ -26,10 +28,8 @@ def suggest(
     picture: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Draw them on the face.")
     ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
+    shapes: SHAPES = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Print the vertices that serve driving best, the most useful first.
 
@@ -48,5 +48,5 @@ def suggest(
         chosen = suggest_points(rig, count)
     if picture is not None:
         save_picture(draw_points(rig.mesh, chosen), picture, overwrite)
-        console.log.info("%s: %d points on the face", picture, len(chosen))
+        console.log.info("%s: %s on the face", picture, plural(len(chosen), "point"))
     console.out.print(",".join(map(str, chosen)), markup=False)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES, TARGET
 from facert.cli.train import DEFAULT_MODEL
-from facert.errors import InputError, OutputExistsError, reading
+from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,10 +52,8 @@ def command(
     ] = 0.0,
     samples: Annotated[int, typer.Option(min=0, max=10_000, help="Other plausible poses.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="For the samples.")] = 0,
-    target: Annotated[
-        str | None, typer.Option(help="Which of several targets of .npz takes.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the output.")] = False,
+    target: TARGET = None,
+    overwrite: OVERWRITE = False,
     view: Annotated[
         bool, typer.Option("--view", help="Pose in the browser, with a slider a control.")
     ] = False,
@@ -67,9 +66,7 @@ def command(
     actor: Annotated[
         Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
     ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    shapes: SHAPES = None,
     host: Annotated[str, typer.Option(help="Address of the page.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port of the page, or the next free one.")] = 8080,
 ) -> None:
@@ -83,9 +80,11 @@ def command(
         raise typer.BadParameter("give values with --set NAME=VALUE, or --view for sliders")
     model = model or DEFAULT_MODEL
     given = _parse(wanted)
-    if output is not None and output.exists() and not overwrite:
-        raise OutputExistsError(output)
     import facert
+    from facert.io.formats import require_take_output
+
+    if output is not None:
+        require_take_output(output, overwrite)
 
     retargeter = facert.load(model) if start or poses is None else None
     begun = _retargeted(start, retargeter, target) if retargeter and start else None
@@ -122,12 +121,12 @@ def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
     """The frame of ``TAKE:FRAME``, retargeted."""
     from dataclasses import replace
 
-    import facert
+    from facert.io.formats import read_source_file
 
     path, _, number = start.rpartition(":")
     if not path or not number.isdecimal():
         raise typer.BadParameter(f"--from {start}: write it as in take.h5:120")
-    take, frame = facert.read_take(Path(path), target), int(number)
+    take, frame = read_source_file(Path(path), target), int(number)
     if frame >= len(take):
         expected = f"a frame from 0 to {len(take) - 1}"
         raise InputError("--from", expected, number, "Choose another.", where=path)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, TARGET
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import IntArray, Take
@@ -46,34 +48,37 @@ def command(
         int | None,
         typer.Option(min=1, help="Directions of motion in a window.", show_default="5 or 3"),
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    target: TARGET = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Write poses, or feature points, for every frame of a take from a few key frames."""
     import numpy as np
 
-    from facert.errors import OutputExistsError, reading
-    from facert.io.formats import read_take_file, write_take_file
+    from facert.errors import reading
+    from facert.io.formats import (
+        read_source_file,
+        read_take_file,
+        require_take_output,
+        write_take_file,
+    )
     from facert.topology.takes import Propagation, propagate_poses, propagate_positions
 
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
-    take = read_take_file(source, target)
+    require_take_output(output, overwrite)
     how = Propagation(method, window, dim)
     if positions is None:
+        take = read_take_file(source, target)
         with reading(source):
             chosen = _keys(keys, every, take.labels, len(take))
             result = propagate_poses(take, chosen, how)
     else:
-        points = read_take_file(positions)
+        take, points = read_source_file(source, target), read_source_file(positions)
         with reading(source):
             seen = np.flatnonzero(points.source.valid.all(axis=1))
             chosen = _keys(keys, every, seen, len(points))
             result = propagate_positions(take, points, chosen, how)
     write_take_file(result, output, overwrite)
-    console.out.print(f"{output}: {len(result)} frames from {len(chosen)} key frames", markup=False)
+    made = f"{plural(len(result), 'frame')} from {plural(len(chosen), 'key frame')}"
+    console.out.print(f"{output}: {made}", markup=False)
     error = _error(result, take if positions is None else points, chosen)
     if error:
         console.out.print(error, markup=False)
@@ -115,4 +120,5 @@ def _error(result: Take, truth: Take, keys: list[int]) -> str:
     rest = np.setdiff1d(np.flatnonzero(~np.isnan(errors).any(axis=1)), keys)
     if not len(rest):
         return ""
-    return f"RMS against the {len(rest)} other frames that the input holds: {rms(errors[rest]):.4f}"
+    others = plural(len(rest), "other frame")
+    return f"RMS against the {others} that the input holds: {rms(errors[rest]):.4f}"

@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
+from facert.cli.options import TARGET
 from facert.errors import reading
 
 
 def command(
     take: Annotated[Path, typer.Argument(help="Take with poses in some frames.")],
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
+    target: TARGET = None,
 ) -> None:
     """Find regions of markers and controls: facert regions take.h5 > regions.toml.
 

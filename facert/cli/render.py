@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import Take
@@ -45,13 +47,9 @@ def command(
     fps: Annotated[
         float | None, typer.Option(min=1, max=120, help="Of a clip; by default 30, GIF 20.")
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which of several targets of .npz takes.")
-    ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    target: TARGET = None,
+    shapes: SHAPES = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Draw faces: a take with its rig or a mesh sequence, beside the truth and others.
 
@@ -129,7 +127,7 @@ def _clip(
         pictures, "drawing", len(chosen), console=console.err, transient=True, disable=hidden
     )
     write_clip(iter(shown), output, rate, overwrite)
-    return f"{len(chosen)} frames, {len(chosen) / rate:.1f} s at {rate:g} frames/s"
+    return f"{plural(len(chosen), 'frame')}, {len(chosen) / rate:.1f} s at {rate:g} frames/s"
 
 
 def _parse(frames: str) -> list[int] | range | None:

@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES, TARGET
 from facert.errors import InputError, OutputExistsError
+from facert.wording import plural
 
 ENDINGS = (".html", ".htm")
 
@@ -30,13 +32,9 @@ def command(
         Path | None, typer.Option("--truth", help="The true poses of the same frames.")
     ] = None,
     title: Annotated[str, typer.Option(help="Stands above all.")] = "",
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz truth that has several.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page.")] = False,
+    shapes: SHAPES = None,
+    target: TARGET = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Write one HTML file with tables, figures and faces, that opens without a network."""
     if output.suffix.lower() not in ENDINGS:
@@ -60,4 +58,4 @@ def command(
             sections.append(file_section(path, rig, truth))
     name = title or ", ".join(path.resolve().name for path in results)
     write_report(make_report(name, tuple(sections)), output, overwrite)
-    console.out.print(f"{output}: {len(sections)} sections", markup=False)
+    console.out.print(f"{output}: {plural(len(sections), 'section')}", markup=False)

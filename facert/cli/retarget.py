@@ -14,16 +14,19 @@ from facert.cli import console
 from facert.cli.batch import carry_out, plan
 from facert.cli.options import (
     CONTROLS,
+    DEVICE,
     ENDING,
     JOBS,
     NO_DETECT,
     NO_SMOOTH,
     OUT_DIR,
+    OVERWRITE,
     SIGMA,
     chosen_handling,
 )
 from facert.cli.train import DEFAULT_MODEL
 from facert.errors import reading
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import Take
@@ -68,15 +71,14 @@ def command(
     target: Annotated[
         str | None, typer.Option(help="Which target of an .npz take that has several is the truth.")
     ] = None,
+    device: DEVICE = "cpu",
     out_dir: OUT_DIR = None,
-    ending: ENDING = ".h5",
-    jobs: JOBS = 1,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an existing output file.")
-    ] = False,
+    ending: ENDING = None,
+    jobs: JOBS = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Write the character's parameters for every frame of a take."""
-    todo = plan(paths, out_dir, ending, overwrite)
+    todo = plan(paths, out_dir, ending, jobs, overwrite)
     handling = partial(
         chosen_handling,
         controls=controls,
@@ -86,9 +88,15 @@ def command(
         neutral=neutral,
     )
     work = partial(
-        _retarget, model=model, mode=mode, handling=handling, target=target, overwrite=overwrite
+        _retarget,
+        model=model,
+        mode=mode,
+        handling=handling,
+        target=target,
+        device=device,
+        overwrite=overwrite,
     )
-    carry_out(todo, work, jobs, overwrite)
+    carry_out(todo, work, overwrite)
 
 
 def _retarget(
@@ -99,23 +107,24 @@ def _retarget(
     mode: Mode,
     handling: Callable[[Retargeter], Handling],
     target: str | None,
+    device: str,
     overwrite: bool,
 ) -> None:
     """One take."""
     import time
 
     import facert
+    from facert.io.formats import read_source_file
 
     retargeter = _loaded(model.resolve(), _stamp(model))
-    take = facert.read_take(source, target=target)
+    take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
     with reading(source):
-        result = retargeter.retarget(take, mode.value, handling(retargeter))
+        result = retargeter.retarget(take, mode.value, handling(retargeter), device)
     seconds = time.perf_counter() - began
     facert.write_take(result, output, overwrite)
-    console.log.info(
-        "%d frames in %.2f s (%.3f ms a frame)", len(take), seconds, 1e3 * seconds / len(take)
-    )
+    frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
+    console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.out.print(f"wrote {output}", markup=False)
     _tell_error(take, result, retargeter)
 
@@ -158,7 +167,8 @@ def _print_errors(truth: Take, result: Take) -> None:
     if comparison is None:
         console.log.info("the poses in the input are of other controls: not compared")
         return
-    table = Table(title=f"RMS against {comparison.frames} poses that it was not trained on")
+    poses = plural(comparison.frames, "pose")
+    table = Table(title=f"RMS against {poses} that it was not trained on")
     table.add_column("controls")
     table.add_column("number", justify="right")
     table.add_column("RMS", justify="right")

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES
+from facert.wording import plural
 
 
 def command(
@@ -31,11 +33,9 @@ def command(
     missing: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Share of the markers' positions to hide.")
     ] = 0.0,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    shapes: SHAPES = None,
     seed: Annotated[int, typer.Option(min=0, help="For markers, noise and gaps.")] = 0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Simulate a marker capture by driving a rig with recorded weights.
 
@@ -45,8 +45,9 @@ def command(
     from facert.errors import reading
     from facert.io import formats
 
+    formats.require_take_output(output, overwrite)
     chosen = None if vertices is None else _indices(vertices)
-    actor, performance = formats.read_rig_file(rig, shapes), formats.read_take_file(weights)
+    actor, performance = formats.read_rig_file(rig, shapes), formats.read_source_file(weights)
     with reading(weights):
         take = simulate_capture(
             actor,
@@ -58,11 +59,9 @@ def command(
             seed=seed,
         )
     formats.write_take_file(take, output, overwrite)
-    poses = 0 if take.controls is None else len(take.controls.names)
-    console.out.print(
-        f"{output}: {len(take)} frames of {len(take.source.names)} markers, {poses} parameters",
-        markup=False,
-    )
+    controls = 0 if take.controls is None else len(take.controls.names)
+    markers_of = f"{plural(len(take), 'frame')} of {plural(len(take.source.names), 'marker')}"
+    console.out.print(f"{output}: {markers_of}, {plural(controls, 'control')}", markup=False)
 
 
 def _indices(text: str) -> list[int]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from facert.cli import console
-from facert.cli.options import NO_DETECT
-from facert.errors import InputError, OutputExistsError, reading
+from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
+from facert.errors import InputError, reading
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.cleaning.stabilisation import Stabilised
@@ -41,10 +42,8 @@ def command(
         ),
     ] = None,
     no_detect: NO_DETECT = False,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    target: TARGET = None,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Remove the head's rigid motion from markers.
 
@@ -52,22 +51,21 @@ def command(
     than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
     as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
     """
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
     from facert.cleaning.stabilisation import stabilise
     from facert.cli.cleaned_take import read_observed, write_beside
-    from facert.io.formats import read_take_file
+    from facert.io.formats import read_source_file, require_take_output
 
+    require_take_output(output, overwrite)
     if like is not None and reference != "mean":
         raise typer.BadParameter("--like and --reference both tell the head pose: give one")
-    pose = _frame(reference) if like is None else read_take_file(like, target)
+    pose = _frame(reference) if like is None else read_source_file(like, target)
     take = read_observed(source, target, no_detect)
     with reading(source):
         found = stabilise(take, _names(stable), pose)
     if found.interpolated.any():
         console.log.warning(
-            "%d frames show fewer than three stable markers: head motion interpolated",
-            found.interpolated.sum(),
+            "head motion interpolated in %s with fewer than three stable markers",
+            plural(int(found.interpolated.sum()), "frame"),
         )
     write_beside(found.take, output, overwrite, {"/source/head": found.head.matrices})
     _print_removed(found, output)

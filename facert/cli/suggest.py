@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import IntArray, Take
@@ -37,14 +39,10 @@ def command(
     rig_path: Annotated[
         Path | None, typer.Option("--rig", help="The actor's rig, to draw tracked weights.")
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    target: TARGET = None,
+    shapes: SHAPES = None,
     as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the sheet.")] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Print the frames whose posing would help most, the most useful first.
 
@@ -54,9 +52,9 @@ def command(
 
     from facert.cli.pictures import require_picture_name, save_picture
     from facert.errors import reading
-    from facert.io.formats import read_rig_file, read_take_file
+    from facert.io.formats import read_rig_file
     from facert.suggestion.frames import suggest_frames
-    from facert.view.contact import contact_sheet
+    from facert.view.contact import contact_sheet, require_drawable
     from facert.view.render import MAX_FRAMES
 
     if rig_path is not None and sheet is None:
@@ -66,9 +64,12 @@ def command(
         if count > MAX_FRAMES:
             raise typer.BadParameter(f"a sheet shows at most {MAX_FRAMES} frames")
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
-    take = read_take_file(take_path, target)
+    model = _model(have) if have not in ("", LABELS) else None
+    take = _read(take_path, target, have, model)
     with reading(take_path):
-        found = suggest_frames(take, count, _posed(take, have), seed)
+        if sheet is not None:
+            require_drawable(take, rig)
+        found = suggest_frames(take, count, model or _posed(take, have), seed)
     rows = _rows(take, found)
     if as_json:
         typer.echo(json.dumps({"file": str(take_path), "frames": rows}, indent=2))
@@ -79,20 +80,29 @@ def command(
             headings = [f"{row['frame']}   {_moment(row)}" for row in rows]
             figure = contact_sheet(take, found.frames.tolist(), headings, rig)
         save_picture(figure, sheet, overwrite)
-        console.log.info("%s: %d frames", sheet, len(rows))
+        console.log.info("%s: %s", sheet, plural(len(rows), "frame"))
 
 
-def _posed(take: Take, have: str) -> Sequence[int] | IntArray | Retargeter:
-    """What the suggestion goes on from."""
+def _read(path: Path, target: str | None, have: str, model: Retargeter | None) -> Take:
+    """The take; of several targets the one that is gone on from, else none."""
+    from facert.io.formats import read_source_file, read_take_file
+
+    if have == LABELS:
+        return read_take_file(path, target)
+    return read_source_file(path, target, () if model is None else model.controls.names)
+
+
+def _posed(take: Take, have: str) -> Sequence[int] | IntArray:
+    """The frames that the suggestion goes on from."""
     if have != LABELS:
-        return _model(have) if have else ()
+        return ()
     if not len(take.labels):
         from facert.errors import InputError
 
         raise InputError(
             "/target/params", "posed frames, for --have labels", "none", "Leave --have out."
         )
-    console.log.info("goes on from %d posed frames", len(take.labels))
+    console.log.info("goes on from %s", plural(len(take.labels), "posed frame"))
     return take.labels
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from facert.cli import console
-from facert.cli.options import NO_DETECT
+from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
 from facert.settings import Settings
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
 DEFAULT_MODEL = Path("model.safetensors")
 DEFAULTS = Settings()
+OF_SHARED = (
+    "latent_dim", "neighbours", "sigma_c", "sigma_t", "source_noise_floor", "target_noise_floor",
+    "likelihood", "inducing", "optimizer", "tolerance", "max_iterations", "checkpoint_every",
+)  # fmt: skip
 SMALL = 0.01  # of numbers below it digits are shown, not decimals
 
 
@@ -97,16 +102,22 @@ def command(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue a shared model from its checkpoint.")
     ] = False,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            help="A trained shared model to begin at, as after another frame was posed; its "
+            "settings are the defaults."
+        ),
+    ] = None,
     curve: Annotated[
         Path | None,
         typer.Option("--log", help="CSV file for the training curve of a shared model."),
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace existing output files.")
+    target: TARGET = None,
+    foretold: Annotated[
+        bool, typer.Option("--foretold", help="Learn from poses that a model foretold as well.")
     ] = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Learn to retarget from a take's poses, its other frames, and old animation."""
     _require_output(output, curve)
@@ -132,23 +143,25 @@ def command(
     from facert.cli.progress import ProgressBar
     from facert.methods import method_class
 
-    settings = _settings(config, options)
+    begin = None if start is None else facert.load(start)
+    settings = _settings(begin, config, options)
     stepwise = method_class(settings.method).stepwise and settings.regions is None
+    _warn_of_idle_settings(settings)
     if not stepwise:
-        _warn_of_idle_options(settings, resume, curve)
+        _warn_of_idle_options(settings, {"--resume": resume, "--log": curve, "--start": start})
     checkpoint = CheckpointFile(checkpoint_path(output), resume) if stepwise else None
     # An interrupted run leaves a model, and a checkpoint to continue from.
     continues = checkpoint is not None and checkpoint.continues
     overwrite_model = overwrite or continues
     if output.exists() and not overwrite_model:
         raise OutputExistsError(output)
-    data = _read(take, target)
+    data = replace(_read(take, target), std=None) if foretold else _read(take, target)
     _check_regions(regions, settings.regions, data)
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
     with reading(take or "the built-in take"), ProgressBar() as bar:
-        retargeter = facert.train(data, settings, Monitors(*monitors, bar))
+        retargeter = facert.train(data, settings, Monitors(*monitors, bar), begin)
     retargeter.save(output, overwrite_model)
     status = retargeter.figures.get("status")
     if checkpoint is not None and status in ("converged", "stalled"):
@@ -159,11 +172,11 @@ def command(
         raise typer.Exit(130)
 
 
-def _settings(config: Path | None, options: dict[str, Any]) -> Settings:
-    """Of the config file, then of the options that were given."""
+def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, Any]) -> Settings:
+    """Of the model to begin at, of the config file, then of the options that were given."""
     from facert.io.toml import read_toml
 
-    settings = DEFAULTS
+    settings = DEFAULTS if begin is None else replace(begin.settings, labels=None)
     if config is not None:
         with reading(config):
             settings = settings.with_changes(read_toml(config))
@@ -186,13 +199,23 @@ def _check_regions(given: str | None, regions: Regions | str | None, take: Take)
             regions.matched(take.source.names, take.controls.names)
 
 
-def _warn_of_idle_options(settings: Settings, resume: bool, curve: Path | None) -> None:
+def _warn_of_idle_settings(settings: Settings) -> None:
+    """Say which settings are the shared models' alone where another method learns."""
+    from facert.methods import method_class
+
+    idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(DEFAULTS, name)]
+    if idle and not method_class(settings.method).stepwise:
+        told = "%s does not use %s: settings of the shared models, sgplvm and ssgplvm"
+        console.log.warning(told, settings.method, ", ".join(idle))
+
+
+def _warn_of_idle_options(settings: Settings, options: dict[str, object]) -> None:
     """Say which options do nothing where nothing is trained step by step."""
-    idle = [name for name, given in (("--resume", resume), ("--log", curve)) if given]
+    idle = [name for name, given in options.items() if given]
     if idle:
-        options = " and ".join(idle)
+        names = " and ".join(idle)
         learner = settings.method if settings.regions is None else f"{settings.method} in regions"
-        console.log.warning("%s learns in one go: nothing to do for %s", learner, options)
+        console.log.warning("%s learns in one go: nothing to do for %s", learner, names)
 
 
 def _require_output(output: Path, curve: Path | None) -> None:

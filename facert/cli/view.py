@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
+from facert.cli.options import SHAPES, TARGET
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
     from facert.data import Rig, Take
     from facert.pages.performance import Performance
+    from facert.retargeter import Retargeter
     from facert.view.faces import Face
 
 
@@ -28,12 +30,8 @@ def command(
     actor_path: Annotated[
         Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(help="Which of several targets of .npz takes.")
-    ] = None,
-    shapes: Annotated[
-        str | None, typer.Option(help="Which of several sets of shapes of an .npz rig.")
-    ] = None,
+    target: TARGET = None,
+    shapes: SHAPES = None,
     host: Annotated[
         str, typer.Option(help="Address to listen on; 0.0.0.0 for other machines as well.")
     ] = "127.0.0.1",
@@ -43,17 +41,22 @@ def command(
 
     Ctrl-C ends it.
     """
-    from facert.io.formats import read_rig_file, read_take_file
+    import facert
+    from facert.io.formats import read_rig_file, read_source_file, read_take_file
     from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
 
     require_viser()
     from facert.pages.view_page import ViewPage
 
-    take = read_take_file(path, target)
+    retargeter = facert.load(model) if model is not None else None
+    if retargeter is None:
+        take = read_take_file(path, target)
+    else:
+        take = read_source_file(path, target, retargeter.controls.names)
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
     truth = read_take_file(truth_path, target) if truth_path is not None else None
     with reading(path):
-        performance = _performance(take, rig, truth, model)
+        performance = _performance(take, rig, truth, retargeter)
         actor = actor_of(take, actor_path, shapes)
     with page_server(path.name, host, port) as server:
         page = ViewPage(server, performance, actor)
@@ -63,14 +66,13 @@ def command(
 
 
 def _performance(
-    take: Take, rig: Rig | None, truth: Take | None, model: Path | None
+    take: Take, rig: Rig | None, truth: Take | None, retargeter: Retargeter | None
 ) -> Performance:
     """The take as it is, or retargeted."""
-    import facert
     from facert.pages.performance import Performance, retargeted
 
-    if model is not None:
-        return retargeted(take, facert.load(model), rig, truth)
+    if retargeter is not None:
+        return retargeted(take, retargeter, rig, truth)
     posed_here = take.labels if len(take.labels) < len(take) else take.labels[:0]
     return Performance(take, posed_here, rig, truth)
 

@@ -9,6 +9,7 @@ import numpy as np
 from facert.data import FloatArray
 from facert.evaluation.cells import Outcome
 from facert.evaluation.comparison import Estimate, errors_by_method
+from facert.wording import plural
 
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
 FIRM = 5  # draws from which on advice can stand alone
@@ -41,7 +42,7 @@ def advise(outcomes: Sequence[Outcome]) -> str:
 def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
     """What more labels would bring, from the RMS at each number of labels, (labels, repeats)."""
     means = errors.mean(axis=1)
-    seen = f"RMS {means[0]:.3g} with {labels[0]} labels"
+    seen = f"RMS {means[0]:.3g} with {plural(labels[0], 'label')}"
     if len(labels) == 1:
         return f"{seen}; evaluate a range of labels to see what more would bring."
     seen += f", {means[-1]:.3g} with {labels[-1]}"

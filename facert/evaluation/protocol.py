@@ -70,7 +70,7 @@ class Problem:
     ----------
     take : Take
         Training data is drawn from it. Where it has an animation, that is the unlabelled target;
-        else poses of its frames are.
+        else poses of its frames may be, see `poses_are_frames`.
     test : Take
         Test frames are drawn from it: `take` itself, or another one with the same controls.
     protocol : Protocol
@@ -93,6 +93,15 @@ class Problem:
         """The character's."""
         assert self.take.controls is not None  # make_problem
         return self.take.controls
+
+    @property
+    def poses_are_frames(self) -> bool:
+        """Whether unlabelled poses are poses of its frames.
+
+        They are where there is no animation and at least half of the frames are posed; in a take
+        with fewer each pose is worth more as a label, and there are no unlabelled poses.
+        """
+        return self.take.animation is None and 2 * len(self.take.labels) >= len(self.take)
 
     @property
     def ranges(self) -> FloatArray:
@@ -164,24 +173,24 @@ def draw(problem: Problem, labels: int, unlabelled: int, repeat: int) -> Draw:
     InputError
         When the take is too short.
     """
-    pool, candidates = _pools(problem, repeat)
+    pool, candidates = pools(problem, repeat)
     order = _rng(problem, repeat, _FRAMES).permutation(pool)
     is_posed = np.isin(order, problem.take.labels)
     posed, unposed = order[is_posed], order[~is_posed]
     labelled, back = posed[:labels], posed[::-1]
-    animation = problem.take.animation
-    if animation is None:
+    if problem.poses_are_frames:
         frames, poses = _deal(unposed, back, unlabelled)
         used = np.concatenate([labelled, frames, poses])
     else:
         frames = np.concatenate([unposed, back])[:unlabelled]
-        poses = _rng(problem, repeat, _ANIMATION).permutation(len(animation))[:unlabelled]
+        count = 0 if problem.take.animation is None else len(problem.take.animation)
+        poses = _rng(problem, repeat, _ANIMATION).permutation(count)[:unlabelled]
         used = np.concatenate([labelled, frames])
     if not problem.across:
         candidates = np.setdiff1d(candidates, used)
     test = _capped(problem, candidates, repeat)
     if len(labelled) < labels or len(np.unique(used)) < len(used) or not len(test):
-        raise _too_short(labels, unlabelled, animation is not None, len(posed))
+        raise _too_short(labels, unlabelled, problem, len(posed))
     return Draw(np.sort(labelled), np.sort(frames), np.sort(poses), test)
 
 
@@ -223,8 +232,8 @@ def true_poses(problem: Problem, chosen: Draw) -> FloatArray:
     return _poses(problem.test)[chosen.test]
 
 
-def _pools(problem: Problem, repeat: int) -> tuple[IntArray, IntArray]:
-    """The frames to draw training data from, and those to test on."""
+def pools(problem: Problem, repeat: int) -> tuple[IntArray, IntArray]:
+    """The frames to draw training data from in a repeat, and those to test on."""
     trained = np.flatnonzero(_observed(problem.take))
     if problem.across:
         tested = np.flatnonzero(_observed(problem.test))
@@ -292,14 +301,15 @@ def _check_posed(take: Take) -> None:
         )
 
 
-def _too_short(labels: int, unlabelled: int, animated: bool, posed: int) -> InputError:
+def _too_short(labels: int, unlabelled: int, problem: Problem, posed: int) -> InputError:
     parts = [f"{labels} labels", f"{unlabelled} unlabelled frames"]
-    parts += [] if animated else [f"{unlabelled} unlabelled poses"]
+    parts += [f"{unlabelled} unlabelled poses"] if problem.poses_are_frames else []
     return InputError(
         "/target/params",
         f"posed frames for {', '.join(parts)} and a test",
         f"{posed} to draw from",
-        "Ask for fewer labels or fewer unlabelled frames (--unlabelled 0), or pose more.",
+        "Ask for fewer labels or fewer unlabelled frames (--unlabelled 0), or for none of both: "
+        "by default there are as many as the take allows.",
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from facert.data import FloatArray
 
 INITIAL_THETA = (1.0, 1.0, 100.0)  # the paper's {θ1, θ2, θ3}
+LEAST_EXCESS = 1e-3  # noise above the floor where a search begins, relative to the floor
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,14 @@ class Kernel:
         """From (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
         variance, inverse_width, excess = np.exp(log_kernel)
         return cls(float(variance), float(inverse_width), float(excess) + noise_floor)
+
+    def to_log(self, noise_floor: float) -> FloatArray:
+        """The inverse of `from_log`.
+
+        Noise at the floor is taken to be a little above, or no gradient would lead away from it.
+        """
+        excess = max(self.noise - noise_floor, LEAST_EXCESS * noise_floor)
+        return np.log([self.variance, self.inverse_width, excess])
 
     @property
     def theta(self) -> tuple[float, float, float]:

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 from scipy.linalg.blas import dsymm, dsyrk
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dlauum
 
 from facert.data import FloatArray
-from facert.gp.jitter import lower_factor
+from facert.gp.jitter import inverted, lower_factor
 
 
 def value_and_gradient(
@@ -55,7 +55,7 @@ def value_and_gradient(
         np.einsum("nn->n", K)[...] += excess + noise_floor  # einsum: a view of the diagonal
     L = lower_factor(K)
     log_determinant = 2.0 * float(np.log(L.diagonal()).sum())
-    K_inverse, _ = dpotri(L, lower=1, overwrite_c=1)
+    K_inverse, _ = dlauum(inverted(L), lower=1, overwrite_c=1)  # L⁻ᵀ L⁻¹
     # Fᵀ and Aᵀ: what is C-contiguous to NumPy is their transpose to Fortran.
     A_T = dsymm(1.0, K_inverse, F.T, side=1, lower=1)
     value = 0.5 * (

@@ -30,9 +30,11 @@ from facert.gp.lapack import value_and_gradient
 
 
 def compact_factor(X: Tensor) -> Tensor:
-    """F (n, r) with F Fᵀ = X Xᵀ and r = rank X: only this product enters the likelihood."""
+    """F (n, r) with F Fᵀ = X Xᵀ to rounding and r its rank: only this product is ever needed."""
     U, S, _ = torch.linalg.svd(X, full_matrices=False)
-    rank = int((S > S[0] * max(X.shape) * torch.finfo(X.dtype).eps).sum()) if len(S) else 0
+    squares = S.square()
+    least = squares[:1] * max(X.shape) * torch.finfo(X.dtype).eps
+    rank = int((squares > least).sum())
     F: Tensor = U[:, :rank] * S[:rank]
     return F.contiguous()
 

@@ -124,8 +124,8 @@ class Predictor:
 
     def _kernel_jacobian(self, at: PosteriorPoint) -> FloatArray:
         """∂k/∂z, G of `jacobians`, (B, q, N)."""
-        G = (at.offsets * (-self.kernel.inverse_width * at.k)[:, :, None]).transpose(0, 2, 1)
-        return np.ascontiguousarray(G)
+        weights = -self.kernel.inverse_width * at.k
+        return np.multiply(at.offsets.transpose(0, 2, 1), weights[:, None, :], order="C")
 
 
 class Posterior(Predictor):

@@ -6,14 +6,18 @@ the arithmetic. So everything that is multiplied by [Tᵀ | α] is one product,
 
     G [Tᵀ | α] = [H | J],       G = ∂k/∂z,      H = G Tᵀ,       J = ∂μ/∂z,
 
-and J diag(w) Jᵀ - 2 a H Hᵀ and α (w r) - 2 a K⁻¹k are one product each. Frames that need more than
-plain steps, downhill with a positive definite Hessian, are left to the general method.
+and J diag(w) Jᵀ - 2 a H Hᵀ and α (w r) - 2 a K⁻¹k are one product each. The latter is the slope of
+F in k, and G times it the slope in z. Frames that need more than plain steps, downhill with a
+positive definite Hessian, are left to the general method.
+
+G, H and J depend on z alone. So the first step of a frame is taken from where the last one of its
+predecessor was: what is known there is used again.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dposv
@@ -29,8 +33,39 @@ DECREMENT = 1e-4
 ROUNDING = 1e-7
 
 
-@dataclass(frozen=True, slots=True)
-class Descent:
+class View(NamedTuple):
+    """What the source view says at z (q,), whatever is observed.
+
+    Parameters
+    ----------
+    z : array, shape (q,)
+    offsets : array, shape (q, N)
+        z - z_i of every position.
+    k : array, shape (N,)
+    whitened : array, shape (N,)
+        T k.
+    mean : array, shape (d_x,)
+        μ.
+    s : float
+        σ_p².
+    """
+
+    z: FloatArray
+    offsets: FloatArray
+    k: FloatArray
+    whitened: FloatArray
+    mean: FloatArray
+    s: float
+
+
+class Stand(NamedTuple):
+    """A view with its slopes [H | J], (q, N + d_x): most of the work of a step."""
+
+    view: View
+    slopes: FloatArray
+
+
+class Descent(NamedTuple):
     """Where the search for one frame ended.
 
     Parameters
@@ -43,29 +78,23 @@ class Descent:
         ∇²F where the last step, which is tiny, was taken from.
     energy : float
         F(z*).
+    stand : Stand
+        Where that was: the next frame can begin there.
     """
 
     z: FloatArray
     x: FloatArray
     hessian: FloatArray
     energy: float
+    stand: Stand
 
 
-@dataclass(frozen=True, slots=True)
-class _Point:
-    """What the source view says at z, and what a frame says of that."""
+class _Residual(NamedTuple):
+    """What a frame says of a view."""
 
     energy: float
-    s: float
-    mean: FloatArray
-    whitened: FloatArray
     w: FloatArray
     wr: FloatArray
-
-    @property
-    def x(self) -> FloatArray:
-        """x*(z), (d_x,)."""
-        return self.mean - self.s * self.wr
 
 
 class FrameMapping:
@@ -89,74 +118,81 @@ class FrameMapping:
         self._identity = np.eye(len(self._Z_T))
 
     def descend(
-        self, z: FloatArray, b: FloatArray, R: FloatArray, energy: float = math.inf
+        self, stand: Stand, b: FloatArray, R: FloatArray, energy: float = math.inf
     ) -> Descent | None:
-        """Newton's method from z (q,) for the frame b (d_x,) seen with variance R (d_x,).
+        """Newton's method for the frame b (d_x,) seen with variance R (d_x,).
 
         Returns
         -------
         Descent, or None
-            None where F(z) is above the energy given, a step would lead uphill, or the Hessian is
-            not positive definite.
+            None where F is above the energy given to begin with, a step would lead uphill, or the
+            Hessian is not positive definite.
         """
         for _ in range(MOST_STEPS):
-            at, gradient, hessian = self.expand(z, b, R)
-            if not at.energy <= energy + ROUNDING:
+            value, gradient, hessian = self.expand(stand, b, R)
+            if not value <= energy + ROUNDING:
                 return None
-            energy = at.energy
+            energy = value
             _, step, indefinite = dposv(hessian, gradient)
             if indefinite:
                 return None
-            z = z - step
+            z = stand.view.z - step
             if float(gradient @ step) < DECREMENT:
-                end, *_ = self._look(z, b, R)
-                return Descent(z, end.x, hessian, end.energy)
+                view = self.view(z)
+                end = _residual(view, b, R)
+                return Descent(z, view.mean - view.s * end.wr, hessian, end.energy, stand)
+            stand = self.stand(z)
         return None
 
     def energy(self, z: FloatArray, b: FloatArray, R: FloatArray) -> float:
         """F(z)."""
-        return self._look(z, b, R)[0].energy
+        return _residual(self.view(z), b, R).energy
 
     def expand(
-        self, z: FloatArray, b: FloatArray, R: FloatArray
-    ) -> tuple[_Point, FloatArray, FloatArray]:
-        """The point z, ∇F (q,) and ∇²F (q, q)."""
-        at, offsets, k = self._look(z, b, R)
+        self, stand: Stand, b: FloatArray, R: FloatArray
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """F, ∇F (q,) and ∇²F (q, q) of a frame."""
+        (z, offsets, k, whitened, _, s), slopes = stand
         n = len(k)
-        product = (offsets * (-self._theta2 * k)) @ self._stacked
-        H, J = product[:, :n], product[:, n:]
-        s, w, wr = at.s, at.w, at.wr
+        H, J = slopes[:, :n], slopes[:, n:]
+        value, w, wr = _residual(stand.view, b, R)
         w2r = w * wr
         a = 0.5 * (len(b) / s - float(wr @ wr))
         a_slope = float(w2r @ wr) - 0.5 * len(b) / s**2
-        g = -2.0 * (H @ at.whitened)
-        u = J @ w2r
-        gradient = J @ wr + a * g + z
+        ek = (self._stacked @ np.concatenate([-2.0 * a * whitened, wr])) * k
+        gradient = z - self._theta2 * (offsets @ ek)
 
         weights = np.concatenate([np.full(n, -2.0 * a), w])
-        ek = (self._stacked @ np.concatenate([-2.0 * a * at.whitened, wr])) * k
-        # a' g gᵀ - u gᵀ - g uᵀ = v gᵀ + g vᵀ
-        v = (0.5 * a_slope) * g - u
+        g = -2.0 * (H @ whitened)
+        # a' g gᵀ - u gᵀ - g uᵀ = v gᵀ + g vᵀ, where u = J (w² r)
+        v = (0.5 * a_slope) * g - J @ w2r
         vg = v[:, None] * g
-        hessian = (product * weights) @ product.T
+        hessian = (slopes * weights) @ slopes.T
         hessian += (offsets * (self._theta2**2 * ek)) @ offsets.T
         hessian += vg
         hessian += vg.T
         hessian += (1.0 - self._theta2 * float(ek.sum())) * self._identity
-        return at, gradient, hessian
+        return value, gradient, hessian
 
-    def _look(
-        self, z: FloatArray, b: FloatArray, R: FloatArray
-    ) -> tuple[_Point, FloatArray, FloatArray]:
-        """The point z, z - z_i of every position (q, N), and k (N,)."""
+    def stand(self, z: FloatArray) -> Stand:
+        """The view at z with its slopes."""
+        view = self.view(z)
+        return Stand(view, (view.offsets * (-self._theta2 * view.k)) @ self._stacked)
+
+    def view(self, z: FloatArray) -> View:
+        """The view at z."""
         offsets = z[:, None] - self._Z_T
         k = np.exp(np.einsum("qn,qn->n", offsets, offsets) * (-0.5 * self._theta2))
         k *= self._variance
         product = k @ self._stacked
         whitened, mean = product[: len(k)], product[len(k) :]
         s = self._noise + max(self._variance - float(whitened @ whitened), 0.0)
-        w = 1.0 / (R + s)
-        r = mean - b
-        wr = w * r
-        energy = 0.5 * (float(wr @ r) + len(b) * math.log(s) + float(z @ z))
-        return _Point(energy, s, mean, whitened, w, wr), offsets, k
+        return View(z, offsets, k, whitened, mean, s)
+
+
+def _residual(view: View, b: FloatArray, R: FloatArray) -> _Residual:
+    w = 1.0 / (R + view.s)
+    r = view.mean - b
+    wr = w * r
+    energy = float(wr @ r) + len(b) * math.log(view.s) + float(view.z @ view.z)
+    return _Residual(0.5 * energy, w, wr)

@@ -11,6 +11,7 @@ from facert.data import FloatArray
 from facert.gp.kernel import Kernel, initial_log_kernel
 from facert.gp.likelihood import compact_factor, negative_log_likelihood
 from facert.gp.posterior import Posterior, Predictor
+from facert.gplvm.energy import View, energy
 from facert.gplvm.prior import half_square, latent_precision
 
 
@@ -97,7 +98,26 @@ class SharedGPLVM(nn.Module):
 
     def forward(self) -> Tensor:
         """-log P(X|Z) P(Y|Z) P(Z), what training minimises, Eq. (4)."""
+        if self.Z.device.type != "cpu":
+            return self.sum_of_energies()
+        variables, views = (self.Z, self.log_kernel_x, self.log_kernel_y), self._views()
+        return energy(*variables, self.precision, *views) + self._prior_constant
+
+    def sum_of_energies(self) -> Tensor:
+        """The same, term by term."""
         return self.source_energy() + self.target_energy() + self.prior_energy()
+
+    def _views(self) -> tuple[View, View]:
+        return (
+            View(slice(self.rows_x), self.factor_x.numpy(), self.columns_x, self.noise_floor_x),
+            View(self.rows_y.numpy(), self.factor_y.numpy(), self.columns_y, self.noise_floor_y),
+        )
+
+    def begin_with(self, kernel_x: Kernel, kernel_y: Kernel) -> None:
+        """Take over the kernels of a trained model, each in the units of its view."""
+        with torch.no_grad():
+            self.log_kernel_x.copy_(torch.from_numpy(kernel_x.to_log(self.noise_floor_x)))
+            self.log_kernel_y.copy_(torch.from_numpy(kernel_y.to_log(self.noise_floor_y)))
 
     @property
     def kernel_x(self) -> Kernel:

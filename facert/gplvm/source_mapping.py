@@ -28,7 +28,7 @@ import numpy as np
 
 from facert.data import BoolArray, FloatArray
 from facert.gp.posterior import PosteriorPoint, Predictor
-from facert.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping
+from facert.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping, Stand
 
 MAX_ITERATIONS = 200  # in all; most frames need three or four
 SHIFTED_DECREMENT = 1e-9  # a shifted step foretells little, however much is left
@@ -90,6 +90,8 @@ class Mapped:
         F(z*).
     converged : array of bool, shape (B,)
         Whether Newton's method met its tolerance.
+    stand : Stand, optional
+        Of a single frame that was followed: where its last step was taken from.
     """
 
     z: FloatArray
@@ -97,10 +99,11 @@ class Mapped:
     hessian: FloatArray
     energy: FloatArray
     converged: BoolArray
+    stand: Stand | None = None
 
 
 @dataclass(frozen=True)
-class _Expansion:
+class Expansion:
     """F and its derivatives at B latent positions."""
 
     energy: FloatArray
@@ -117,6 +120,8 @@ class SourceMapping:
         The source view, X given Z.
     """
 
+    chunk = CHUNK
+
     def __init__(self, posterior: Predictor) -> None:
         self.posterior = posterior
         # F at every training latent is the search for a start: keep what does not change.
@@ -130,10 +135,16 @@ class SourceMapping:
 
     def start(self, observed: Observation) -> FloatArray:
         """The training latent of least energy for each frame, (B, q)."""
-        # σ_p² varies little between the training latents: its mean serves all.
+        return np.asarray(self.posterior.Z[self._train_energies(observed).argmin(axis=1)])
+
+    def _train_energies(self, observed: Observation) -> FloatArray:
+        """About F at the training latents, (B, N)."""
+        # σ_p² varies little between them: its mean serves all.
         w = 1.0 / (self._train_variance + observed.variance)
-        energies = np.hstack([w, w * observed.mean]) @ self._train_means + self._train_energy
-        return np.asarray(self.posterior.Z[energies.argmin(axis=1)])
+        wb = w * observed.mean
+        of_frame = 0.5 * np.einsum("bd,bd->b", wb, observed.mean)
+        of_both = np.concatenate([w, wb], axis=1) @ self._train_means
+        return np.asarray(of_both + self._train_energy + of_frame[:, None])
 
     def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
         """F(z) for B frames, (B,)."""
@@ -155,24 +166,26 @@ class SourceMapping:
             All frames; solved in chunks, so that memory stays bounded.
         """
         posterior = self.posterior
-        frames = min(CHUNK, len(observed.mean))
+        frames = min(self.chunk, len(observed.mean))
         scratch = np.empty((frames * posterior.Z.shape[1], posterior.stacked.shape[1]))
         chunks = [
             self._newton(observed[rows], [start[rows] for start in starts], scratch)
             for rows in (
-                slice(first, first + CHUNK) for first in range(0, len(observed.mean), CHUNK)
+                slice(first, first + self.chunk)
+                for first in range(0, len(observed.mean), self.chunk)
             )
         ]
         if len(chunks) == 1:
             return chunks[0]
-        return Mapped(
-            *(
-                np.concatenate([getattr(chunk, name) for chunk in chunks])
-                for name in Mapped.__dataclass_fields__
-            )
+        names = ("z", "x", "hessian", "energy", "converged")
+        z, x, hessian, energy, converged = (
+            np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in names
         )
+        return Mapped(z, x, hessian, energy, converged)
 
-    def follow(self, observed: Observation, previous: FloatArray) -> Mapped:
+    def follow(
+        self, observed: Observation, previous: FloatArray, stand: Stand | None = None
+    ) -> Mapped:
         """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
 
         Parameters
@@ -181,13 +194,19 @@ class SourceMapping:
             One frame.
         previous : array, shape (1, q)
             z of the frame before.
+        stand : Stand, optional
+            `Mapped.stand` of that frame, as good as its z and quicker.
         """
         frame, b, R = self._frame, observed.mean[0], observed.variance[0]
-        (nearest,) = self.start(observed)
-        least = frame.energy(nearest, b, R)
-        found = frame.descend(previous[0], b, R, least)
-        if found is None and frame.energy(previous[0], b, R) > least:
-            found = frame.descend(nearest, b, R)
+        energies = self._train_energies(observed)[0]
+        least = energies.argmin()
+        stand = stand or frame.stand(previous[0])
+        found = frame.descend(stand, b, R, float(energies[least]))
+        if found is None:
+            nearest = self.posterior.Z[least]
+            if frame.energy(nearest, b, R) < frame.energy(stand.view.z, b, R):
+                stand = frame.stand(nearest)
+            found = frame.descend(stand, b, R)
         if found is None:
             return self.solve(observed, previous)
         return Mapped(
@@ -196,6 +215,7 @@ class SourceMapping:
             found.hessian[None],
             np.array([found.energy]),
             np.array([True]),
+            found.stand,
         )
 
     def _newton(
@@ -247,7 +267,7 @@ class SourceMapping:
 
     def _expand(
         self, z: FloatArray, observed: Observation, scratch: FloatArray | None = None
-    ) -> _Expansion:
+    ) -> Expansion:
         """F, ∇F and ∇²F at z (B, q), by the formulas at the head of this file."""
         posterior = self.posterior
         theta2 = posterior.kernel.inverse_width
@@ -278,7 +298,7 @@ class SourceMapping:
         )
         diagonal = np.arange(z.shape[1])
         hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
-        return _Expansion(_energy(z, at, w, r), gradient, hessian)
+        return Expansion(_energy(z, at, w, r), gradient, hessian)
 
 
 def _leave_saddles(

@@ -65,11 +65,9 @@ class SparseSharedGPLVM(SharedGPLVM):
         rows = inducing_rows(len(Y), labelled, inducing)
         self.inducing_y = nn.Parameter(torch.from_numpy(self.latents_y[rows]))
 
-    def begin_at(self, core: SharedGPLVM) -> None:
-        """Take over the kernels of a trained model of fewer rows."""
-        with torch.no_grad():
-            self.log_kernel_x.copy_(core.log_kernel_x)
-            self.log_kernel_y.copy_(core.log_kernel_y)
+    def forward(self) -> Tensor:
+        """The bounds on Eqs. (1) and (2) and the prior (5), what training minimises."""
+        return self.sum_of_energies()
 
     def source_energy(self) -> Tensor:
         """The bound on -log P(X|Z) over labelled and source-only rows."""

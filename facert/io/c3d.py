@@ -20,6 +20,7 @@ import numpy as np
 from facert.data import FloatArray, Source, Take
 from facert.errors import InputError, reading
 from facert.io.text import MAX_BYTES, existing_file
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from c3d import Reader
@@ -119,7 +120,7 @@ def _identified(labels: Sequence[str], points: int) -> tuple[list[str], list[int
             "POINT:LABELS", "labelled markers", f"none of {points}", "Label the capture first."
         )
     if len(kept) < points:
-        log.info("left out %d points without a label", points - len(kept))
+        log.info("left out %s without a label", plural(points - len(kept), "point"))
     return [labels[i] for i in kept], kept
 
 

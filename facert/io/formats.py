@@ -22,12 +22,12 @@ a folder           OBJ files: a rig                   -
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
 from facert.data import Rig, Take
-from facert.errors import InputError, reading
+from facert.errors import InputError, OutputExistsError, reading
 from facert.io import npz
 from facert.io.c3d import read_c3d
 from facert.io.curves import read_curves, write_curves
@@ -43,6 +43,7 @@ from facert.io.table import read_table, write_table
 from facert.io.take import read_take, write_take
 from facert.io.text import existing_file, read_header
 from facert.io.trc import read_trc
+from facert.wording import plural
 
 log = logging.getLogger("facert")
 
@@ -50,6 +51,7 @@ Kind = Literal["take", "rig"]
 
 HDF5_ENDINGS = (".h5", ".hdf5")
 GLTF_ENDINGS = (".glb", ".gltf")
+TAKE_OUTPUTS = (*HDF5_ENDINGS, ".livelink.csv", ".csv", ".json")
 TAKE_ENDINGS = (*HDF5_ENDINGS, ".csv", ".json", ".txt", ".c3d", ".trc", *GLTF_ENDINGS, ".npz")
 
 _ADVICE = {
@@ -113,6 +115,35 @@ def read_take_file(path: Path, target: str | None = None, fps: float | None = No
     return found
 
 
+def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
+    """The targets of a take among which ``--target`` chooses, and the controls of each.
+
+    Empty where there is nothing to choose.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".npz" or not path.is_file() or npz.holds_rig(path):
+        return {}
+    targets = npz.read_targets(path)
+    return targets if len(targets) > 1 else {}
+
+
+def read_source_file(path: Path, target: str | None = None, controls: Sequence[str] = ()) -> Take:
+    """Read a take for its source: of several targets the one with these controls, else none.
+
+    Raises
+    ------
+    InputError
+        As `read_take_file` does.
+    """
+    targets = targets_of(path) if target is None else {}
+    if targets:
+        fitting = (key for key, names in targets.items() if set(names) == set(controls))
+        target = next(fitting, npz.NO_TARGET)
+        told = f"the model's is {target}" if target else "none is read"
+        log.info("%s has several targets (%s): %s", Path(path).name, ", ".join(targets), told)
+    return read_take_file(path, target)
+
+
 def read_rig_file(path: Path, shapes: str | None = None) -> Rig:
     """Read a rig from any format; see `read_any`.
 
@@ -138,17 +169,44 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
         When `path` exists and `overwrite` is not set.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending in HDF5_ENDINGS:
+    require_take_output(path, overwrite)
+    if path.suffix.lower() in HDF5_ENDINGS:
         write_take(take, path, overwrite)
-    elif path.name.lower().endswith(".livelink.csv"):
+        return
+    _tell_what_is_lost(take, path)
+    if path.name.lower().endswith(".livelink.csv"):
         write_livelink(take, path, overwrite)
-    elif ending == ".csv":
+    elif path.suffix.lower() == ".csv":
         write_table(take, path, overwrite)
-    elif ending == ".json":
-        write_curves(take, path, overwrite)
     else:
-        raise unknown_output(path, ".h5, .hdf5, .livelink.csv, .csv or .json")
+        write_curves(take, path, overwrite)
+
+
+def require_take_output(path: Path, overwrite: bool) -> None:
+    """Refuse a name that no take can be written to, before any work is done.
+
+    Raises
+    ------
+    InputError
+        For an ending that cannot be written.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    if not path.name.lower().endswith(TAKE_OUTPUTS):
+        raise unknown_output(path, ", ".join(TAKE_OUTPUTS))
+    if path.exists() and not overwrite:
+        raise OutputExistsError(path)
+
+
+def _tell_what_is_lost(take: Take, path: Path) -> None:
+    """Warn of a file of poses alone that is to hold a few: read again, it would be a source."""
+    if not 0 < len(take.labels) < len(take):
+        return
+    back = f"facert convert RECORDING OUT.h5 --poses {path.name} brings both together"
+    if path.name.lower().endswith(".livelink.csv"):  # the rest of its rows are dropped when read
+        back = "only a .csv, .json or .h5 tells of which frames"
+    poses = plural(len(take.labels), "pose")
+    log.warning("%s holds %s and not what was recorded: %s", path.name, poses, back)
 
 
 def write_rig_file(rig: Rig, path: Path, overwrite: bool = False) -> None:

@@ -21,7 +21,7 @@ from facert.errors import InputError
 from facert.geometry import vertex_normals
 from facert.io.atomic import replacing
 from facert.morphs import Morphs
-from facert.units import METRES
+from facert.units import in_metres
 
 _GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}
@@ -102,7 +102,7 @@ def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
 
 def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
     node: dict[str, Any] = {"name": name, "mesh": 0}
-    metres = METRES.get(morphs.neutral.units, 1.0)
+    metres = in_metres(morphs.neutral.units) or 1.0
     if metres != 1.0:
         node["scale"] = [metres] * 3
     mesh = _mesh(morphs, name, buffer)

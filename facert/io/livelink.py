@@ -1,16 +1,14 @@
 """Live Link Face CSV, both ways.
 
 One row an observation: ``Timecode,BlendShapeCount``, then the 52 ARKit shapes and nine angles in
-radians. Columns are found by name: 51, 52 and 61 of them occur, in several spellings. A timecode
-is ``HH:MM:SS:FF.mmm``, with FF in 1/60 s whatever the rate of the rows; rows come with gaps, and a
-row whose count is 0 saw no face.
+radians. Columns are found by name: 51, 52 and 61 of them occur, in several spellings. Rows come
+with gaps, and a row whose count is 0 saw no face; `livelink_clock` reads the timecodes.
 """
 
 from __future__ import annotations
 
 import csv
 import logging
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,17 +17,31 @@ import numpy as np
 from facert.data import BoolArray, FloatArray, IntArray, Source, Take
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
+from facert.io.livelink_clock import (
+    APP_COUNT,
+    TICKS,
+    counted,
+    format_timecode,
+    parse_timecode,
+    says_its_count,
+    unwrap_midnight,
+)
 from facert.io.rate import nominal_rate
 from facert.io.text import Row, check_width, read_csv, to_numbers
 from facert.names import ARKIT_NAMES, canonical, match, nearest
+from facert.wording import plural
+
+__all__ = [
+    "TICKS",
+    "format_timecode",
+    "is_livelink",
+    "parse_timecode",
+    "read_livelink",
+    "write_livelink",
+]
 
 log = logging.getLogger("facert")
 
-TICKS = 60_000
-"""Ticks a second: timecodes count thousandths of 1/60 s, and are kept as whole numbers."""
-
-_DAY = 24 * 3600 * TICKS
-_TIMECODE = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d):([0-5]\d(?:\.\d+)?)")
 _LEADING = ("Timecode", "BlendShapeCount")
 
 
@@ -57,15 +69,16 @@ def read_livelink(path: Path) -> Take:
             )
         rows = _rows_with_face(rows)
         check_width(rows, header)
-        ticks = _unwrap_midnight(np.array([_row_ticks(row) for row in rows], dtype=np.int64))
+        ticks, count = _clock(rows)
         kept = _rising(ticks)
         values = to_numbers(rows, header, range(2, len(header)))[kept]
         time = (ticks[kept] - ticks[0]) / TICKS
+        rate = nominal_rate(time)
         return Take(
             time=time,
             source=Source(values, _canonical_columns(header[2:])),
-            fps=nominal_rate(time),
-            start_timecode=rows[0].cells[0].strip(),
+            fps=rate,
+            start_timecode=_start(rows[0].cells[0].strip(), count, rate),
         )
 
 
@@ -90,7 +103,8 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
         writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
         writer.writerows(_rows(ticks, columns, known))
     if not known.all():
-        log.info("%d frames without a pose are rows without a face", np.sum(~known))
+        unposed = plural(int(np.sum(~known)), "frame")
+        log.info("%s without a pose: rows without a face", unposed)
 
 
 def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
@@ -104,28 +118,13 @@ def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
             "frames that are known in part",
             "Fill the gaps first (facert retarget does), or write a .csv table.",
         )
-    start = parse_timecode(take.start_timecode or "00:00:00:00.000")
+    code = take.start_timecode or "00:00:00:00.000"
+    start = parse_timecode(code, APP_COUNT if says_its_count(code) else max(1, round(take.fps)))
     if start is None:
         raise InputError(
             "start_timecode", "HH:MM:SS:FF.mmm", take.start_timecode, "Correct the attribute."
         )
     return start + np.rint(take.time * TICKS).astype(np.int64), columns
-
-
-def parse_timecode(text: str) -> int | None:
-    """Ticks since midnight of ``HH:MM:SS:FF.mmm``; None when it is no timecode."""
-    found = _TIMECODE.fullmatch(text.strip())
-    if found is None:
-        return None
-    hours, minutes, seconds = (int(part) for part in found.groups()[:3])
-    return ((hours * 60 + minutes) * 60 + seconds) * TICKS + round(float(found[4]) * 1000)
-
-
-def format_timecode(ticks: int) -> str:
-    """``HH:MM:SS:FF.mmm`` of ticks since a midnight."""
-    seconds, rest = divmod(ticks % _DAY, TICKS)
-    hours, minutes = divmod(seconds // 60, 60)
-    return f"{hours:02d}:{minutes:02d}:{seconds % 60:02d}:{rest // 1000:02d}.{rest % 1000:03d}"
 
 
 def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
@@ -157,6 +156,28 @@ def _saw_face(row: Row) -> bool:
         ) from None
 
 
+def _clock(rows: Sequence[Row]) -> tuple[IntArray, int]:
+    """Ticks of the rows (T,), and how many FF of their timecodes make a second."""
+    ticks = [_row_ticks(row) for row in rows]
+    count = counted(ticks)
+    if count != APP_COUNT:
+        log.info("timecodes count %d frames a second", count)
+        ticks = [tick // TICKS * TICKS + tick % TICKS * APP_COUNT // count for tick in ticks]
+    return unwrap_midnight(np.array(ticks, dtype=np.int64)), count
+
+
+def _start(code: str, count: int, rate: float) -> str:
+    """The first timecode, so that whoever reads it alone can tell how it counts.
+
+    With thousandths that is 1/60 s, without them frames at the take's own rate.
+    """
+    if count == (APP_COUNT if says_its_count(code) else round(rate)):
+        return code
+    ticks = parse_timecode(code, count)
+    assert ticks is not None  # every row's timecode was read
+    return format_timecode(ticks)
+
+
 def _row_ticks(row: Row) -> int:
     ticks = parse_timecode(row.cells[0])
     if ticks is None:
@@ -169,18 +190,13 @@ def _row_ticks(row: Row) -> int:
     return ticks
 
 
-def _unwrap_midnight(ticks: IntArray) -> IntArray:
-    """Let time go on past midnight: a step back by more than half a day is a new day."""
-    new_days = np.diff(ticks, prepend=ticks[:1]) < -_DAY // 2
-    return ticks + _DAY * np.cumsum(new_days)
-
-
 def _rising(ticks: IntArray) -> IntArray:
     """Indices of the rows that come after every row before them."""
     latest_before = np.maximum.accumulate(ticks)[:-1]
     kept = np.flatnonzero(np.append(True, ticks[1:] > latest_before))
     if len(kept) < len(ticks):
-        log.warning("dropped %d rows whose time does not rise", len(ticks) - len(kept))
+        dropped = plural(len(ticks) - len(kept), "row")
+        log.warning("dropped %s whose time does not rise", dropped)
     return kept
 
 
@@ -217,7 +233,8 @@ def _arkit_columns(take: Take) -> FloatArray:
     columns[np.isnan(values).all(axis=1)] = np.nan
     columns[:, match(names, ARKIT_NAMES, field)] = values
     if len(names) < len(ARKIT_NAMES):
-        log.info("%d columns that the take has not are 0", len(ARKIT_NAMES) - len(names))
+        absent = plural(len(ARKIT_NAMES) - len(names), "column")
+        log.info("%s that the take has not: 0", absent)
     return columns
 
 

@@ -31,6 +31,9 @@ from facert.errors import InputError, reading
 from facert.io.rate import nominal_rate
 from facert.io.text import existing_file
 
+NO_TARGET = ""
+"""Asks for the source alone of a file with several targets."""
+
 MAX_BYTES = 2**30
 """Largest array that is unpacked: one gibibyte."""
 
@@ -134,7 +137,7 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
     ----------
     path : Path
     target : str, optional
-        Which of several targets; one alone, or none, needs no telling.
+        Which of several targets; one alone, or none, needs no telling. `NO_TARGET`: none of them.
     fps : float, optional
         Frames a second where the file does not say.
 
@@ -146,10 +149,22 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
     with open_archive(path) as archive:
         source = _read_source(archive)
         time, rate = _clock(archive, len(source.values), fps)
-        key = _choose(_targets(archive), target, "--target")
+        key = None if target == NO_TARGET else _choose(_targets(archive), target, "--target")
         params = None if key is None else archive.numbers(key)
         controls = None if key is None else Controls(archive.names(_names_key(key, archive)))
         return Take(time=time, source=source, controls=controls, params=params, fps=rate)
+
+
+def read_targets(path: Path) -> dict[str, tuple[str, ...]]:
+    """The targets of a track, and the controls of each.
+
+    Raises
+    ------
+    InputError
+        When the file is no .npz archive, or names in it are damaged.
+    """
+    with open_archive(path) as archive:
+        return {key: archive.names(_names_key(key, archive)) for key in _targets(archive)}
 
 
 def read_npz_rig(path: Path, shapes: str | None = None) -> Rig:

@@ -3,7 +3,8 @@
 Lines of cells between tabs: ``PathFileType ...``; the names and the values of ``DataRate``,
 ``NumMarkers``, ``Units`` and others; ``Frame#  Time`` and the markers' names, each over three
 columns; ``X1 Y1 Z1 ...``; then one line a frame. Writers mark what was not observed by blank cells
-or by (0, 0, 0); some hold the last position, which `facert clean` finds.
+or by (0, 0, 0); some hold the last position, which `facert clean` finds. Where ``DataRate`` and the
+column ``Time`` disagree, the column counts, as it does in OpenSim.
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from facert.data import FloatArray, Source, Take
 from facert.errors import InputError, reading
 from facert.io.rate import nominal_rate
 from facert.io.text import Row, read_text, to_numbers
+from facert.wording import plural
 
 log = logging.getLogger("facert")
 
 _FIRST_WORD = "PathFileType"
 _LEADING = 2  # Frame# and Time
+SLACK = 0.01
+"""DataRate and the column Time agree within such a share."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +109,24 @@ def _hide_zeros(positions: FloatArray) -> None:
     """Set to NaN what lies exactly at the origin."""
     lost = (positions == 0).all(axis=2)
     if lost.any():
-        log.info("%d positions at (0, 0, 0) count as not observed", lost.sum())
+        log.info("not observed: %s at (0, 0, 0)", plural(int(lost.sum()), "position"))
     positions[lost] = np.nan
 
 
 def _rate(header: _Header, time: FloatArray) -> float:
+    """Frames a second as the header states it, unless the times of the frames say otherwise."""
+    shown = nominal_rate(time)
     try:
-        return float(header.facts["datarate"])
+        stated = float(header.facts["datarate"])
     except (KeyError, ValueError):
-        return nominal_rate(time)
+        return shown
+    if not (np.diff(time) > 0).all() or _agrees(stated, shown, time):
+        return stated
+    log.warning("DataRate says %g frames/s, the column Time %.4g: the column counts", stated, shown)
+    return shown
+
+
+def _agrees(stated: float, shown: float, time: FloatArray) -> bool:
+    """Whether frames are so far apart usually, or on average where times are rounded."""
+    frames = stated * (time[-1] - time[0])
+    return abs(stated - shown) <= SLACK * shown or abs(frames - len(time) + 1) <= SLACK * frames

@@ -15,7 +15,7 @@ import facert
 from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
 from facert.morphs import Morphs
-from facert.units import METRES
+from facert.units import in_metres
 
 ENDINGS = (".usd", ".usda", ".usdc")
 
@@ -57,7 +57,7 @@ def write_usd(
     with replacing(path, overwrite) as temporary:
         stage = Usd.Stage.CreateNew(str(temporary))
         UsdGeom.SetStageUpAxis(stage, "Z" if up_axis.lower() == "z" else "Y")
-        UsdGeom.SetStageMetersPerUnit(stage, METRES.get(morphs.neutral.units, 1.0))
+        UsdGeom.SetStageMetersPerUnit(stage, in_metres(morphs.neutral.units) or 1.0)
         _set_clock(stage, morphs, fps)
         root = UsdSkel.Root.Define(stage, _ROOT)
         stage.SetDefaultPrim(root.GetPrim())

@@ -117,12 +117,32 @@ class Decoder(Protocol):
         """
         ...
 
+    def rehearse(self, packet: bytes) -> None:
+        """Understand once more what was understood before, at no consequence."""
+        ...
+
 
 class Encoder(Protocol):
     """Writes the packets of one protocol."""
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """The packets of a pose (P,) at a time in seconds."""
+        ...
+
+
+class Mapper(Protocol):
+    """What makes poses of frames."""
+
+    def step(self, frame: Frame) -> Streamed:
+        """The pose of the next frame; raises FacertError when there is none."""
+        ...
+
+    def prepare(self) -> None:
+        """Do what need not wait for the next frame."""
+        ...
+
+    def rehearse(self, frame: Frame) -> Streamed:
+        """Do what `step` does, and forget it: code and data are then at hand for the next frame."""
         ...
 
 
@@ -135,6 +155,14 @@ class Output(Protocol):
 
     def close(self) -> None:
         """Let go of what it holds."""
+        ...
+
+
+class Sender(Output, Protocol):
+    """Where poses go at once."""
+
+    def rehearse(self, frame: Frame, pose: Streamed) -> None:
+        """Do all but pass it on."""
         ...
 
 
@@ -159,6 +187,10 @@ class Receiver(Protocol):
 
     def wait(self, seconds: float) -> list[Frame]:
         """The frames that have come, oldest first; after so many seconds also none."""
+        ...
+
+    def rehearse(self) -> None:
+        """Understand the last packet once more, at no consequence."""
         ...
 
     def close(self) -> None:

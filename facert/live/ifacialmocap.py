@@ -43,6 +43,10 @@ class IFacialMocapDecoder:
             raise BadPacketError("not iFacialMocap")
         return Observed(values)
 
+    def rehearse(self, packet: bytes) -> None:
+        """See `facert.live.frames.Decoder`."""
+        self.decode(packet)
+
     def _place(self, name: str) -> int | None:
         if name not in self._spelled and len(self._spelled) < 16 * len(ARKIT_SHAPES):
             self._spelled[name] = _PLACES.get(canonical(name))

@@ -72,6 +72,10 @@ class LiveLinkDecoder:
             identity=packet,
         )
 
+    def rehearse(self, packet: bytes) -> None:
+        """See `facert.live.frames.Decoder`."""
+        self.decode(packet)
+
 
 class LiveLinkEncoder:
     """Writes a pose as the app would.

@@ -6,17 +6,15 @@ import logging
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from facert.errors import FacertError
-from facert.live.frames import Frame, Output, Receiver
+from facert.live.frames import Frame, Mapper, Output, Receiver, Sender
 from facert.live.meter import Meter
 from facert.live.recording import SourceRecord
+from facert.live.rhythm import Rhythm
 from facert.threads import threads_for
-
-if TYPE_CHECKING:
-    from facert.streaming import Streamed
 
 log = logging.getLogger("facert")
 
@@ -46,12 +44,14 @@ class Session:
     hiccup of the machine, all are mapped if that is done at once (`CATCH_UP`); else the newest
     frame wins and older ones are dropped.
 
+    A process that sleeps between frames wakes with cold caches, and would take three times as long
+    as back to back. So shortly before a frame is due, the last one is rehearsed.
+
     Parameters
     ----------
     receiver : Receiver
-    mapping : callable
-        From a frame to its pose; a `FacertError` means that there is none.
-    senders, records : sequence of Output
+    mapper : Mapper
+    senders, records : sequences of Sender and Output
         Where a pose goes at once, and what keeps it then; latency is that of the senders.
     record : SourceRecord, optional
         Keeps every frame that came in.
@@ -60,14 +60,16 @@ class Session:
     def __init__(
         self,
         receiver: Receiver,
-        mapping: Callable[[Frame], Streamed],
-        senders: Sequence[Output],
+        mapper: Mapper,
+        senders: Sequence[Sender],
         records: Sequence[Output] = (),
         record: SourceRecord | None = None,
     ) -> None:
         self.counters, self.meter = receiver.counters, Meter()
-        self._receiver, self._mapping = receiver, mapping
+        self._receiver, self._mapper = receiver, mapper
         self._senders, self._records, self._record = senders, records, record
+        self._rhythm = Rhythm()
+        self._last: Frame | None = None
 
     def run(
         self,
@@ -88,10 +90,15 @@ class Session:
         end = time.perf_counter() + limits.seconds
         with threads_for(1):
             while not (stopped() or self._receiver.finished or self._done(limits)):
-                left = end - time.perf_counter()
-                if left <= 0:
+                now = time.perf_counter()
+                if now >= end:
                     break
-                self._turn(self._receiver.wait(min(PATIENCE, left)), limits)
+                ready = self._rhythm.until_ready(now, self.meter.cost)
+                frames = self._receiver.wait(min(PATIENCE, end - now, ready))
+                if frames:
+                    self._turn(frames, limits)
+                else:
+                    self._rehearse()
                 between()
 
     def _done(self, limits: Limits) -> bool:
@@ -105,14 +112,16 @@ class Session:
             if self._done(limits):
                 break
             self._map(frame)
-        if self._record is not None:
-            for frame in frames:
+        self._mapper.prepare()
+        for frame in frames:
+            self._rhythm.heard(frame.arrived)
+            if self._record is not None:
                 self._record.add(frame)
 
     def _map(self, frame: Frame) -> None:
         begun = time.perf_counter()
         try:
-            pose = self._mapping(frame)
+            pose = self._mapper.step(frame)
         except FacertError as error:
             if not self.counters.failed:
                 log.warning("a frame has no pose, nothing is sent for such: %s", error)
@@ -121,6 +130,17 @@ class Session:
         for sender in self._senders:
             sender.send(frame, pose)
         self.meter.add(frame.arrived, begun, time.perf_counter())
+        self._last = frame
         self.counters.mapped += 1
         for record in self._records:
             record.send(frame, pose)
+
+    def _rehearse(self) -> None:
+        """Go through the last frame once more, so that all is at hand when the next one comes."""
+        if self._last is None:
+            return
+        self._receiver.rehearse()
+        with suppress(FacertError):
+            pose = self._mapper.rehearse(self._last)
+            for sender in self._senders:
+                sender.rehearse(self._last, pose)

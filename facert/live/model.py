@@ -17,9 +17,10 @@ from facert.errors import FacertError, InputError, NumericalError
 from facert.handling import Handling
 from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
+from facert.live.rest import RestWatch
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data import FloatArray, Take
     from facert.retargeter import Retargeter
     from facert.streaming import RetargetStream, Streamed
 
@@ -37,11 +38,27 @@ Signature = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Loaded:
-    """A retargeter with a stream of its own."""
+    """A retargeter with two streams of its own.
+
+    Parameters
+    ----------
+    retargeter : Retargeter
+    handling : Handling
+    stream : RetargetStream
+        Maps the session's frames.
+    twin : RetargetStream
+        Rehearses them, so that the stream's memory stays what the frames made it.
+    """
 
     retargeter: Retargeter
     handling: Handling
     stream: RetargetStream
+    twin: RetargetStream
+
+    def calibrate(self, rest: FloatArray) -> None:
+        """Make up for where the actor is at rest."""
+        self.stream.calibrate(rest)
+        self.twin.calibrate(rest)
 
 
 class ModelFile:
@@ -92,6 +109,8 @@ class LiveModel:
         Nominal frames a second; measured when they are not known.
     handling : callable, optional
         What is done about bad markers, noise and single controls, for a model.
+    rest_seconds : float, optional
+        At the session's start in which the actor rests; from then on frames are calibrated.
 
     Raises
     ------
@@ -106,12 +125,15 @@ class LiveModel:
         pattern: Take,
         fps: float | None = None,
         handling: Callable[[Retargeter], Handling] | None = None,
+        rest_seconds: float | None = None,
     ) -> None:
         self._file, self._pattern, self._fps = file, pattern, fps
         self._handling = handling or (lambda _: Handling())
         self._loaded = self._prepare(retargeter)
         self._next: Loaded | None = None
         self._times: list[float] = []
+        self._rest: FloatArray | None = None
+        self._rest_watch = None if rest_seconds is None else RestWatch(rest_seconds)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="facert model", daemon=True)
 
@@ -144,17 +166,28 @@ class LiveModel:
             When the frame cannot be mapped.
         """
         if self._next is not None:
-            self._loaded, self._next = self._next, None
+            loaded, self._next = self._next, None
+            self._use(loaded)
             log.info("%s: the new model is in use", self._file.path)
         elif self._fps is None:
             self._measure_rate(frame.time)
-        try:
-            pose = self._loaded.stream.step(frame.values)
-        except (np.linalg.LinAlgError, ArithmeticError) as error:
-            raise NumericalError(str(error)) from error
-        if not np.isfinite(pose.params).all():
-            raise NumericalError("the pose is not finite")
-        return pose
+        if self._rest_watch is not None:
+            self._rest_watch.see(frame)
+        return _finite(self._loaded.stream, frame)
+
+    def prepare(self) -> None:
+        """Do what need not wait for the next frame."""
+        watch = self._rest_watch
+        if watch is not None and watch.is_over:
+            self._rest = watch.rest(self.retargeter.source_units.scale)
+            self._rest_watch = None
+            self._loaded.calibrate(self._rest)
+            log.info("calibrated: the actor at rest is known")
+        self._loaded.stream.prepare()
+
+    def rehearse(self, frame: Frame) -> Streamed:
+        """Map a frame once more, on a stream beside; see `facert.live.frames.Mapper`."""
+        return _finite(self._loaded.twin, frame)
 
     def _measure_rate(self, time: float) -> None:
         """Begin again at the true rate when enough frames have told it."""
@@ -162,11 +195,17 @@ class LiveModel:
         if len(self._times) == _MEASURED:
             self._fps = nominal_rate(np.array(self._times))
             if not _is_near(self._fps, self.retargeter):
-                self._loaded = self._with_stream(self.retargeter, self._loaded.handling)
+                self._use(self._with_streams(self.retargeter, self._loaded.handling))
 
-    def _with_stream(self, retargeter: Retargeter, handling: Handling) -> Loaded:
+    def _use(self, loaded: Loaded) -> None:
+        self._loaded = loaded
+        if self._rest is not None:
+            loaded.calibrate(self._rest)
+
+    def _with_streams(self, retargeter: Retargeter, handling: Handling) -> Loaded:
         names = self._pattern.source.names
-        return Loaded(retargeter, handling, retargeter.stream(names, self._fps, handling))
+        stream, twin = (retargeter.stream(names, self._fps, handling) for _ in range(2))
+        return Loaded(retargeter, handling, stream, twin)
 
     def _prepare(self, retargeter: Retargeter) -> Loaded:
         """A stream for the session's frames, after one that made all code and caches warm."""
@@ -177,7 +216,7 @@ class LiveModel:
         warming = retargeter.stream(retargeter.source_names, self._fps)
         for _ in range(_WARMING):
             warming.step(rest)
-        return self._with_stream(retargeter, self._handling(retargeter))
+        return self._with_streams(retargeter, self._handling(retargeter))
 
     def _watch(self) -> None:
         while not self._stop.wait(LOOK_EVERY):
@@ -208,6 +247,17 @@ class LiveModel:
                 str(self._file.path),
             )
         return self._prepare(retargeter)
+
+
+def _finite(stream: RetargetStream, frame: Frame) -> Streamed:
+    """The pose of a frame; raises FacertError when there is none that is finite."""
+    try:
+        pose = stream.step(frame.values)
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        raise NumericalError(str(error)) from error
+    if not np.isfinite(pose.params).all():
+        raise NumericalError("the pose is not finite")
+    return pose
 
 
 def _is_near(fps: float, retargeter: Retargeter) -> bool:

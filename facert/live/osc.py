@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,11 +36,21 @@ _PASSED = "NI[]"
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """An address and the texts and numbers that come with it."""
+    """An address and the texts and numbers that come with it.
+
+    Parameters
+    ----------
+    address : str
+    texts : tuple of str
+    numbers : tuple of float
+    place : int
+        Where its numbers are in the datagram, if all follow each other with 32 bits; else -1.
+    """
 
     address: str
     texts: tuple[str, ...]
     numbers: tuple[float, ...]
+    place: int = field(default=-1, compare=False)
 
 
 def parse(packet: bytes) -> list[Message]:
@@ -53,15 +63,15 @@ def parse(packet: bytes) -> list[Message]:
     """
     found: list[Message] = []
     try:
-        _collect(packet, found, 0)
+        _collect(packet, found, 0, 0)
     except (struct.error, UnicodeDecodeError) as error:
         raise BadPacketError("malformed") from error
     return found
 
 
-def _collect(packet: bytes, found: list[Message], depth: int) -> None:
+def _collect(packet: bytes, found: list[Message], depth: int, place: int) -> None:
     if not packet.startswith(_BUNDLE):
-        found.append(_message(packet))
+        found.append(_message(packet, place))
         return
     if depth == _DEEPEST or len(packet) < len(_AT_ONCE):
         raise BadPacketError("bundles too deep, or cut off")
@@ -71,11 +81,11 @@ def _collect(packet: bytes, found: list[Message], depth: int) -> None:
         position += _INT.size
         if not 0 < size <= len(packet) - position:
             raise BadPacketError("an element of another size")
-        _collect(packet[position : position + size], found, depth + 1)
+        _collect(packet[position : position + size], found, depth + 1, place + position)
         position += size
 
 
-def _message(packet: bytes) -> Message:
+def _message(packet: bytes, place: int) -> Message:
     address, position = _text(packet, 0)
     if not address.startswith("/"):
         raise BadPacketError("no address")
@@ -95,7 +105,10 @@ def _message(packet: bytes) -> Message:
             numbers.append(_EMPTY[tag])
         elif tag not in _PASSED:
             position = _after(packet, tag, position)
-    return Message(address, tuple(texts), tuple(numbers))
+    only = tags.endswith("f" * len(numbers))  # then they are the last that the message holds
+    place += len(packet) - _INT.size * len(numbers)
+    whole = position == len(packet)
+    return Message(address, tuple(texts), tuple(numbers), place if only and whole else -1)
 
 
 def _after(packet: bytes, tag: str, position: int) -> int:

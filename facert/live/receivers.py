@@ -41,6 +41,7 @@ class UdpReceiver:
         self.pattern, self.counters = decoder.pattern, Counters()
         self.start_timecode = ""
         self._socket, self._decoder, self._order = listening, decoder, Order()
+        self._latest = b""
         self._socket.setblocking(False)
         with suppress(OSError):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
@@ -63,6 +64,11 @@ class UdpReceiver:
             if arrived > end:
                 break
         return frames
+
+    def rehearse(self) -> None:
+        """See `facert.live.frames.Receiver`."""
+        if self._latest:
+            self._decoder.rehearse(self._latest)
 
     def _waiting(self) -> Iterator[tuple[bytes, str, float]]:
         """Packets that are there, with their senders' hosts and when they were fetched."""
@@ -89,6 +95,7 @@ class UdpReceiver:
         except BadPacketError:
             self.counters.bad += 1
             return None
+        self._latest = packet
         if observed is None:
             return None
         placed = self._order.place(observed, host, arrived)
@@ -149,6 +156,9 @@ class TakeReceiver:
             for row in range(first, self._next)
             if _count_seen(self._values[row], self.counters)
         ]
+
+    def rehearse(self) -> None:
+        """There is nothing to understand."""
 
     def close(self) -> None:
         """Nothing is held."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import tempfile
@@ -62,13 +63,28 @@ class TakeFile:
     def write(self, take: Take) -> Path:
         """Write the take, as HDF5 where the format cannot hold it; return where."""
         try:
-            write_take_file(take, self.path, self.overwrite)
+            return self._write(take, self.path)
         except InputError as error:
-            instead = self.path.with_name(f"{self.path.name}.h5")
+            instead = self._write(take, self.path.with_name(f"{self.path.name}.h5"))
             log.warning("written to %s instead: %s", instead, error)
-            write_take_file(take, instead, self.overwrite)
             return instead
-        return self.path
+
+    def _write(self, take: Take, path: Path) -> Path:
+        """Write the take beside a file that appeared meanwhile: both are precious."""
+        place = path if self.overwrite else _free(path)
+        write_take_file(take, place, self.overwrite)
+        if place != path:
+            log.warning("%s appeared meanwhile: written to %s", path, place)
+        return place
+
+
+def _free(path: Path) -> Path:
+    """The path, or the first of ``take-2.h5``, ``take-3.h5``, ... where it is taken."""
+    name, dot, endings = path.name.partition(".")
+    numbers, place = itertools.count(2), path
+    while place.exists():
+        place = path.with_name(f"{name}-{next(numbers)}{dot}{endings}")
+    return place
 
 
 class Rows:

@@ -52,6 +52,10 @@ class UdpSender:
                     log.warning("packets to %s:%s are lost: %s", *self._address[:2], error.strerror)
                 self._counters.unsent += 1
 
+    def rehearse(self, frame: Frame, pose: Streamed) -> None:
+        """Do what `send` does before it sends."""
+        self._encoder.encode(pose.params, frame.time)
+
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()

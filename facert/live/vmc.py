@@ -17,12 +17,14 @@ import math
 import re
 import struct
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray, SourceKind
+from facert.data import FloatArray, IntArray, SourceKind
 from facert.live.frames import BadPacketError, Observed, frame_pattern
 from facert.live.osc import Bundles, Message, message, parse
+from facert.live.osc_layout import Layouts
 from facert.names import NameIndex
 
 _VMC = "/VMC/"
@@ -30,6 +32,29 @@ _VALUE, _CLOCK, _APPLY = "/VMC/Ext/Blend/Val", "/VMC/Ext/T", "/VMC/Ext/Blend/App
 _FRAME = "/frame"
 _NOT_IN_ADDRESS = re.compile(r"[\s#*,/?\[\]{}]")
 _MOST_SPELLINGS = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class _Use:
+    """What the numbers of a datagram are for.
+
+    Parameters
+    ----------
+    columns, numbers : arrays of int, shape (k,)
+        Where values belong, and which of the numbers they are.
+    clock : int, or None
+        Which of the numbers is the sender's clock.
+    last : Message, or None
+        What completes the frame.
+    stamp : int, or None
+        Which of the numbers comes with that.
+    """
+
+    columns: IntArray
+    numbers: IntArray
+    clock: int | None
+    last: Message | None
+    stamp: int | None
 
 
 class OscDecoder:
@@ -54,9 +79,13 @@ class OscDecoder:
         self._empty = np.full((len(names), self._numbers), np.nan)
         self._values = self._empty.copy()
         self._stamp: float | None = None
+        self._layouts: Layouts[_Use] = Layouts()
 
     def decode(self, packet: bytes) -> Observed | None:
         """What the packet tells; see `facert.live.frames.Decoder`."""
+        found = self._layouts.find(packet)
+        if found is not None:
+            return self._filled(*found)
         messages = parse(packet)
         if not all(math.isfinite(number) for one in messages for number in one.numbers):
             raise BadPacketError("NaN or infinity")
@@ -68,17 +97,60 @@ class OscDecoder:
                 self._stamp = one.numbers[0] if one.numbers else None
             else:
                 self._note(one)
+        use = self._use(messages)
+        if use is not None:
+            self._layouts.remember(packet, messages, use)
         return observed
+
+    def rehearse(self, packet: bytes) -> None:
+        """See `facert.live.frames.Decoder`."""
+        self._layouts.find(packet)
+
+    def _filled(self, use: _Use, numbers: FloatArray) -> Observed | None:
+        """What a datagram tells that is like one before, by its numbers."""
+        if not np.isfinite(numbers).all():
+            raise BadPacketError("NaN or infinity")
+        self._values.reshape(-1)[use.columns] = numbers[use.numbers]
+        if use.clock is not None:
+            self._stamp = float(numbers[use.clock])
+        if use.last is None:
+            return None
+        stamp = () if use.stamp is None else (float(numbers[use.stamp]),)
+        return self._complete(replace(use.last, numbers=stamp))
+
+    def _use(self, messages: Sequence[Message]) -> _Use | None:
+        """What the numbers of messages are for; None where that is not always the same."""
+        columns, numbers = [], []
+        clock = last = stamp = None
+        count = 0
+        for one in messages:
+            if last is not None or (one.address == _CLOCK and not one.numbers):
+                return None
+            if one.address == _APPLY or one.address.endswith(_FRAME):
+                last, stamp = one, count if one.numbers else None
+            elif one.address == _CLOCK:
+                clock = count
+            else:
+                place = self._wanted(one)
+                if place is not None:
+                    columns += [place * self._numbers + k for k in range(self._numbers)]
+                    numbers += [count + k for k in range(self._numbers)]
+            count += len(one.numbers)
+        return _Use(np.array(columns, np.int64), np.array(numbers, np.int64), clock, last, stamp)
 
     def _note(self, one: Message) -> None:
         """Keep what a message says of a name that is wanted."""
-        if one.address.startswith(_VMC):
-            name = one.texts[0] if one.address == _VALUE and one.texts else ""
-        else:
-            name = one.address.rpartition("/")[2]
-        place = self._place(name)
-        if place is not None and len(one.numbers) == self._numbers:
+        place = self._wanted(one)
+        if place is not None:
             self._values[place] = one.numbers
+
+    def _wanted(self, one: Message) -> int | None:
+        """Where its numbers belong, if they do."""
+        if len(one.numbers) != self._numbers:
+            return None
+        if one.address.startswith(_VMC):
+            return self._place(one.texts[0] if one.address == _VALUE and one.texts else "")
+        return self._place(one.address.rpartition("/")[2])
 
     def _place(self, name: str) -> int | None:
         if name in self._places:

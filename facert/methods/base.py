@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
 from facert.data import FloatArray
+from facert.normalisation import Normalisation
 from facert.optim.base import Result
 from facert.optim.monitor import Monitor
 from facert.settings import Settings
@@ -99,6 +100,20 @@ class Method(Protocol):
         """d_x and d_y of what it was trained on."""
         ...
 
+    def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
+        """Let `fit` begin at what a method of the same settings has learned.
+
+        One that learns in one go begins anew: it depends on the data alone.
+
+        Parameters
+        ----------
+        other : Method
+            Trained.
+        source, target : Normalisation
+            The units that `fit` will be given, in those that the other was.
+        """
+        ...
+
     def fit(self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...) -> Report:
         """Learn from labelled frames and whatever unlabelled data the method can use."""
         ...
@@ -112,6 +127,18 @@ class Method(Protocol):
             NaN: not observed.
         doubt : array, shape (T, d_x), optional
             Variance of each number, where it was not measured but filled in.
+        """
+        ...
+
+    def on(self, device: str) -> Self:
+        """The trained method, whose `predict` computes on a device, ``"cpu"`` or ``"cuda"``.
+
+        One that learns in one go stays on the CPU, and says so.
+
+        Raises
+        ------
+        DeviceError
+            When the device is not there.
         """
         ...
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -32,6 +33,7 @@ from facert.data import FloatArray
 from facert.learned import Arrays
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.factors import FactorMap, Trio, left_out_poses
+from facert.methods.one_frame import BlendFrame
 from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
 from facert.methods.ssgpr import Basis, FeatureProcess
@@ -106,6 +108,11 @@ class BlendMap(Map):
         variances = [std**2 for std in (plain[1], whitened[1], doubt, missed[1])]
         pose = np.tensordot(self.weights, np.array([self._clip(p) for p in poses]), axes=1)
         return pose, np.sqrt(np.tensordot(self.weights, np.array(variances), axes=1))
+
+    @cached_property
+    def for_frames(self) -> BlendFrame:
+        """The same for single frames."""
+        return BlendFrame(self)
 
     def _clip(self, poses: FloatArray) -> FloatArray:
         return np.clip(poses, *self.range)

@@ -67,14 +67,23 @@ class ProcessMap(Map):
         return mean, np.repeat(std[:, None], mean.shape[1], axis=1)
 
     @property
+    def alpha(self) -> FloatArray:
+        """K⁻¹ Y, (n, d_y)."""
+        return self._stacked[:, len(self.X) :]
+
+    @property
+    def whitening(self) -> FloatArray:
+        """L⁻ᵀ, where L Lᵀ = K, (n, n)."""
+        return self._stacked[:, : len(self.X)]
+
+    @property
     def left_out_errors(self) -> FloatArray:
         """Each pose less what would be said of it if it alone were left out, (n, d_y).
 
         (K⁻¹Y)_i / (K⁻¹)_ii: Rasmussen and Williams (2006), Eq. (5.12).
         """
-        n = len(self.X)
-        L_inverse_T, alpha = self._stacked[:, :n], self._stacked[:, n:]
-        errors: FloatArray = alpha / np.einsum("nm,nm->n", L_inverse_T, L_inverse_T)[:, None]
+        diagonal = np.einsum("nm,nm->n", self.whitening, self.whitening)
+        errors: FloatArray = self.alpha / diagonal[:, None]
         return errors
 
     @cached_property

@@ -15,8 +15,9 @@ region of everything is the method itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from facert.errors import InputError
 from facert.learned import DAMAGED, Arrays
 from facert.methods import make_method
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.regions.nouns import MOST
 from facert.settings import Settings
@@ -101,6 +103,14 @@ class _Part:
         std = None if said.std is None else said.std * self.target_unit
         return Prediction(said.Y * self.target_unit, std, said.X * self.source_unit)
 
+    def begin_at(self, old: _Part, source: Normalisation, target: Normalisation) -> None:
+        """Of the units, given for the face, only what the region sees and moves counts."""
+        self.method.begin_at(
+            old.method,
+            _of_region(source, self.columns, old.source_unit, self.source_unit),
+            _of_region(target, self.controls, old.target_unit, self.target_unit),
+        )
+
     # take, unlike an index, keeps the order in memory: sums of all columns come out the same.
 
     def _frames(self, X: FloatArray) -> FloatArray:
@@ -134,6 +144,12 @@ class Regional:
         """d_x and d_y of the face."""
         return self.layout_.columns.shape[1], self.layout_.weights.shape[1]
 
+    def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
+        """Let each region begin at its own; see `Method.begin_at`."""
+        assert isinstance(other, Regional)
+        for part, old in zip(self.parts_, other.parts_, strict=True):
+            part.begin_at(old, source, target)
+
     def fit(
         self,
         labelled: Labelled,
@@ -166,6 +182,12 @@ class Regional:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
         said = [part.method.predict(*part.observed(frames, doubt)) for part in self.parts_]
         return self._blend(said, frames)
+
+    def on(self, device: str) -> Self:
+        """The same with every region's method on the device; see `Method.on`."""
+        there = copy(self)
+        there.parts_ = [replace(part, method=part.method.on(device)) for part in self.parts_]
+        return there
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other, a stream a region."""
@@ -236,6 +258,11 @@ class Regional:
         eyes = self.layout_.columns.sum(axis=0)
         source = np.where(eyes > 0, seen / np.maximum(eyes, 1.0), frames)
         return Prediction(poses, np.sqrt(variances) if tells_std else None, source)
+
+
+def _of_region(face: Normalisation, columns: IntArray, old: float, new: float) -> Normalisation:
+    """Units of a region in those that it had, from the face's and the region's own in both."""
+    return Normalisation(face.mean[columns] / old, face.scale * new / old)
 
 
 class _RegionalStream:

@@ -10,7 +10,8 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -18,9 +19,11 @@ from facert.data import FloatArray
 from facert.errors import InputError
 from facert.gaps import Gaussian
 from facert.learned import DAMAGED, Arrays, check_axes
-from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.device import find_device
+from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.metrics import rms
+from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.settings import Settings
 from facert.threads import threads_for
@@ -38,6 +41,11 @@ class Map(Arrays, ABC):
     @abstractmethod
     def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Poses of frames X (T, d_x), (T, d_y), and their standard deviation if there is one."""
+
+    @cached_property
+    def for_frames(self) -> FrameMap:
+        """The same for single frames, in a quicker form where there is one."""
+        return RowByRow(self)
 
 
 class Regression(ABC):
@@ -73,6 +81,15 @@ class Regression(ABC):
         sizes = check_axes(self.map_.arrays, self.map_.all_axes())
         return sizes["x"], sizes["y"]
 
+    def begin_at(  # the search is soon over, and so depends on the data alone
+        self,
+        other: Method,  # noqa: ARG002
+        source: Normalisation,  # noqa: ARG002
+        target: Normalisation,  # noqa: ARG002
+    ) -> None:
+        """Nothing to do; see `Method.begin_at`."""
+        log.info("%s learns in one go, and begins anew", self.settings.method)
+
     def fit(
         self,
         labelled: Labelled,
@@ -95,7 +112,7 @@ class Regression(ABC):
         DeviceError
             When the settings ask for a device that is not there.
         """
-        self._stay_on_cpu()
+        self.on(self.settings.device)
         count = len(labelled.X)
         if count < self.least_labels:
             raise InputError(
@@ -116,11 +133,6 @@ class Regression(ABC):
     def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, dict[str, float]]:
         """The map, and what to report of it."""
 
-    def _stay_on_cpu(self) -> None:
-        device = self.settings.device
-        if device != "cpu" and find_device(device).type != "cpu":
-            log.warning("%s trains on the CPU: %s is not used", self.settings.method, device)
-
     def _linear_response(self, frames: FloatArray) -> FloatArray:
         """B, least squares of the map's poses on frames (n, d_x); the ridge is the Gaussian's."""
         if not self.map_.tells_std:
@@ -137,9 +149,15 @@ class Regression(ABC):
         Y, std = self.map_(X)
         return Prediction(Y, None if std is None else np.sqrt(std**2 + variance), X)
 
+    def on(self, device: str) -> Self:
+        """The method itself: on the CPU it is soon done. See `Method.on`."""
+        if device != "cpu" and find_device(device).type != "cpu":  # the second imports torch
+            log.warning("%s stays on the CPU: %s is not used", self.settings.method, device)
+        return self
+
     def stream(self) -> Stream:
         """Begin to map frames one after the other; none remembers those before."""
-        return _MemorylessStream(self)
+        return FrameStream(self.map_.for_frames, self.gaps_, self.response_)
 
     def save(self) -> dict[str, FloatArray]:
         """The arrays of the map, mean and covariance of the source, and B if there is one."""
@@ -189,12 +207,3 @@ class SupervisedRegression(Regression):
     @abstractmethod
     def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[Map, dict[str, float]]:
         """The map from frames X (l, d_x) with poses Y (l, d_y), and what to report of it."""
-
-
-class _MemorylessStream:
-    def __init__(self, method: Regression) -> None:
-        self.method = method
-
-    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
-        """Map one more frame (1, d_x)."""
-        return self.method.predict(frame, doubt)

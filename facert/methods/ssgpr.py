@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,7 @@ from facert.learned import Arrays
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.features import whitening
 from facert.methods.gpr import ProcessMap
+from facert.methods.one_frame import ShrunkFrame
 from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
 
@@ -106,6 +108,11 @@ class ShrunkProcess(Map):
         """Poses of frames X (T, d_x), (T, d_y); the std is the process's."""
         pose, std = self.process(X)
         return self.shrinkage(pose), std
+
+    @cached_property
+    def for_frames(self) -> ShrunkFrame:
+        """The same for single frames."""
+        return ShrunkFrame(self)
 
 
 class SemiSupervisedGPR(Regression):

@@ -15,7 +15,6 @@ from facert.names import match
 from facert.posing.known import KnownPoses, keep
 from facert.posing.pose import LEAST
 from facert.retargeter import Retargeter
-from facert.settings import Settings
 from facert.suggestion.frames import Suggestion, suggest_frames
 from facert.training import train
 
@@ -149,10 +148,9 @@ class Session:
             When the labels are too few, or the model cannot be written.
         """
         take, _ = self._require_take()
-        settings = Settings() if self.model is None else self.model.settings
         if take.animation is None and self._animation is not None:
             take = replace(take, animation=self._animation)
-        model = train(take, replace(settings, labels=None, unlabelled=None))
+        model = train(take, start=self.model)
         result = model.retarget(take)
         if self.model_path is not None:
             model.save(self.model_path, overwrite=True)

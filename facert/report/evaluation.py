@@ -18,6 +18,7 @@ from facert.evaluation.summary import Row, best
 from facert.io.text import existing_file, read_text
 from facert.report.pictures import embedded
 from facert.report.sections import Fact, Picture, Section, Table
+from facert.wording import plural
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +59,7 @@ def _section(name: str, settings: Mapping[str, Any], rows: list[Row]) -> Section
         most = max(row.labels for row in drawn)
         picture = _per_control([row for row in drawn if row.labels == most], controls)
         if picture is not None:
-            caption = f"RMS of each control, with {most} labels"
+            caption = f"RMS of each control, with {plural(most, 'label')}"
             pictures.append(embedded(picture, caption, "svg"))
     told = [Fact(key, _told(settings[key])) for key in TOLD if settings.get(key) not in (None, "")]
     versions = settings.get("versions")
@@ -79,7 +80,7 @@ def _tables(rows: Sequence[Row]) -> tuple[Table, ...]:
         least = best(section)
         cells = tuple(tuple(show(row) for show in columns.values()) for row in section)
         chosen = frozenset(index for index, row in enumerate(section) if row is least)
-        caption = f"{labels} labels, {unlabelled} unlabelled frames and poses"
+        caption = f"{plural(labels, 'label')}, {unlabelled} unlabelled"
         tables.append(Table(caption, tuple(columns), cells, chosen))
     return tuple(tables)
 

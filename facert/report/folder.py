@@ -4,39 +4,44 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 import facert
-from facert.data import Rig, Take
+from facert.data import Controls, Rig, Take
 from facert.errors import InputError, reading
-from facert.io.formats import HDF5_ENDINGS
+from facert.io.curves import read_json_object
+from facert.io.formats import HDF5_ENDINGS, read_take_file
 from facert.io.hdf5 import stated_format
 from facert.io.rig import FORMAT as RIG_FORMAT
 from facert.io.rig import read_rig
 from facert.io.take import FORMAT as TAKE_FORMAT
-from facert.io.take import read_take
 from facert.report.evaluation import read_evaluation
 from facert.report.performance import fits, is_truth_of, performance_section
 from facert.report.sections import Fact, Section
+from facert.wording import plural
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("facert")
 
 MOST = 40  # files of a kind
+CURVES = {"weightMat", "weights"}  # keys of a .json that holds them
 Thing = TypeVar("Thing")
 
 
 def file_section(path: Path, rig: Rig | None = None, truth: Take | None = None) -> Section:
-    """The section of one file: an evaluation (.json), else a take.
+    """The section of one file: an evaluation (.json), else a performance.
 
     Raises
     ------
     InputError
         When it is neither.
     """
-    if path.suffix.lower() == ".json":
+    if _is_evaluation(path):
         return read_evaluation(path)
-    take = facert.read_take(path)
+    take = read_performance(path)
     with reading(path):
         return performance_section(path.name, take, rig, truth)
 
@@ -47,7 +52,9 @@ def folder_sections(
     """Sections of all that lies in a folder; what is none of it is passed over.
 
     Retargeted takes are shown with the first rig in the folder that has their controls, and
-    beside the first take that is posed throughout and has the same frames.
+    beside the first take that is posed throughout and has the same frames. A take that is the
+    truth of another one has no section of its own, nor has a table or JSON of curves beside the
+    .h5 file of the same name.
 
     Raises
     ------
@@ -55,26 +62,61 @@ def folder_sections(
         When there is nothing to report.
     """
     rigs = [rig] if rig is not None else list(_read(_of_format(folder, RIG_FORMAT), read_rig))
-    takes = dict(_named(_of_format(folder, TAKE_FORMAT)))
-    evaluations = list(_read(sorted(folder.glob("*.json"))[:MOST], read_evaluation))
-    performances = [
-        _performance(path, take, rigs, [truth] if truth is not None else list(takes.values()))
-        for path, take in takes.items()
-        if take.std is not None and len(take.labels)
-    ]
-    models = list(_read(sorted(folder.glob("*.safetensors"))[:MOST], _model))
-    sections = (*evaluations, *performances, *models)
+    documents = {path: _is_evaluation(path) for path in _files(folder, ".json")}
+    evaluations = [path for path, is_one in documents.items() if is_one]
+    takes = dict(_takes(folder, [path for path, is_one in documents.items() if not is_one]))
+    models = _files(folder, ".safetensors")
+    sections = (
+        *_read(evaluations, read_evaluation),
+        *_performances(takes, rigs, truth),
+        *_read(models, _model),
+    )
     if not sections:
         expected = "what eval --json or retarget wrote, or models"
         raise InputError("folder", expected, "none", "Give another folder.", where=str(folder))
     return sections
 
 
-def _performance(path: Path, take: Take, rigs: list[Rig], truths: list[Take]) -> Section:
-    rig = next((one for one in rigs if fits(one, take)), None)
-    truth = next((one for one in truths if one is not take and is_truth_of(one, take)), None)
-    with reading(path):
-        return performance_section(path.name, take, rig, truth)
+def read_performance(path: Path) -> Take:
+    """A take with poses; what is written in columns alone, as .csv or .json, is taken for poses.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read.
+    """
+    take = read_take_file(path)
+    if path.suffix.lower() in HDF5_ENDINGS or take.source.kind != "weights":
+        return take
+    values = take.source.values
+    whole = ~np.isnan(values).any(axis=1, keepdims=True)
+    return replace(
+        take, controls=Controls(take.source.names), params=np.where(whole, values, np.nan)
+    )
+
+
+def _performances(
+    takes: dict[Path, Take], rigs: list[Rig], truth: Take | None
+) -> Iterator[Section]:
+    """The takes that are posed throughout, but for those that are the truth of a result."""
+    whole = {path: take for path, take in takes.items() if 0 < len(take) == len(take.labels)}
+    results = {path: take for path, take in whole.items() if _is_result(path, take)}
+    others = [take for path, take in whole.items() if path not in results]
+    known = others if truth is None else [truth]
+    truths = {
+        path: next((one for one in known if is_truth_of(one, take)), None)
+        for path, take in results.items()
+    }
+    for path, take in whole.items():
+        if not any(take is found for found in truths.values()):
+            with reading(path):
+                rig = next((one for one in rigs if fits(one, take)), None)
+                yield performance_section(path.name, take, rig, truths.get(path))
+
+
+def _is_result(path: Path, take: Take) -> bool:
+    """Whether a method wrote the poses; only HDF5 files hold a truth."""
+    return take.std is not None or path.suffix.lower() not in HDF5_ENDINGS
 
 
 def _model(path: Path) -> Section:
@@ -82,7 +124,7 @@ def _model(path: Path) -> Section:
     facts = facert.load(path).facts
     names = facts["source_names"]
     told: dict[str, Any] = {
-        "source": f"{len(names)} {facts['source_kind']}",
+        "source": plural(len(names), facts["source_kind"][:-1]),
         "controls": ", ".join(facts["target_names"]),
         **{name: value for name, value in facts["settings"].items() if value is not None},
         **facts["figures"],
@@ -95,10 +137,37 @@ def _told(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+def _is_evaluation(path: Path) -> bool:
+    """Whether a file is what `eval --json` wrote, and not curves; also of one that is damaged."""
+    if path.suffix.lower() != ".json":
+        return False
+    try:
+        return not CURVES & read_json_object(path).keys()
+    except InputError:
+        return True
+
+
+def _takes(folder: Path, curves: list[Path]) -> Iterator[tuple[Path, Take]]:
+    """Takes, and what columns tell that no take of the same name does."""
+    for path in _of_format(folder, TAKE_FORMAT):
+        yield from ((path, take) for take in _read([path], read_performance))
+    stems = {path.stem for path in _files(folder, *HDF5_ENDINGS)}
+    for path in [*curves, *_files(folder, ".csv")]:
+        if path.name.split(".")[0] not in stems:
+            yield from ((path, take) for take in _read([path], read_performance))
+
+
 def _of_format(folder: Path, form: str) -> list[Path]:
     """HDF5 files of a folder that say that they are of a format."""
-    found = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in HDF5_ENDINGS]
-    return [path for path in found if _stated(path) == form][:MOST]
+    return [path for path in _files(folder, *HDF5_ENDINGS) if _stated(path) == form]
+
+
+def _files(folder: Path, *endings: str) -> list[Path]:
+    """The first files with such an ending, by name."""
+    found = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings]
+    if len(found) > MOST:
+        log.warning("%s: the first %d of %d %s files", folder, MOST, len(found), endings[0])
+    return found[:MOST]
 
 
 def _stated(path: Path) -> str:
@@ -106,11 +175,6 @@ def _stated(path: Path) -> str:
         return stated_format(path)
     except InputError:
         return ""
-
-
-def _named(paths: list[Path]) -> Iterator[tuple[Path, Take]]:
-    for path in paths:
-        yield from ((path, take) for take in _read([path], read_take))
 
 
 def _read(paths: list[Path], read: Callable[[Path], Thing]) -> Iterator[Thing]:

@@ -6,20 +6,27 @@ import base64
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from facert.report.sections import Picture
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
+
+MOST_POINTS = 1000  # of a curve that is drawn as one
 
 
 def embedded(figure: Figure, caption: str, form: Literal["svg", "png"]) -> Picture:
-    """A figure as a picture; the same figure gives the same text."""
-    import matplotlib
-    from matplotlib.text import Text
+    """A figure as a picture; the same figure gives the same text.
 
-    for text in figure.findobj(Text):
-        assert isinstance(text, Text)  # what was looked for
-        text.set_parse_math(False)  # a control may be called $x
+    Of an SVG, curves and bands of thousands of points are drawn as pixels: they would make the
+    page slow and large.
+    """
+    import matplotlib
+
+    for artist in figure.findobj():
+        _prepare(artist)
     options: dict[str, Any] = {"metadata": {"Date": None}} if form == "svg" else {}
     buffer = BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "facert"}):
@@ -28,3 +35,18 @@ def embedded(figure: Figure, caption: str, form: Literal["svg", "png"]) -> Pictu
     return Picture(
         caption, f"data:image/{kind};base64,{base64.b64encode(buffer.getvalue()).decode()}"
     )
+
+
+def _prepare(artist: Artist) -> None:
+    """Take texts as they are, and draw what is long as pixels."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.text import Text
+
+    if isinstance(artist, Text):
+        artist.set_parse_math(False)  # a control may be called $x
+    elif isinstance(artist, Line2D):
+        artist.set_rasterized(np.size(artist.get_xdata()) > MOST_POINTS)
+    elif isinstance(artist, PolyCollection):
+        points = sum(np.shape(path.vertices)[0] for path in artist.get_paths())
+        artist.set_rasterized(points > MOST_POINTS)

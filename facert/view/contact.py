@@ -49,6 +49,7 @@ def contact_sheet(
     """
     from matplotlib.figure import Figure
 
+    require_drawable(take, rig)
     frames = checked_frames(frames, len(take))
     width = min(len(frames), max(ACROSS, math.ceil(math.sqrt(WIDE * len(frames)))))
     height = -(-len(frames) // width)
@@ -58,17 +59,27 @@ def contact_sheet(
     figure.subplots_adjust(0, 0, 1, 1 - margin, wspace=0.02, hspace=HEADING / CELL)
     for axes in grid:
         axes.set_axis_off()
-    if take.source.kind == "markers":
-        if rig is not None:
-            raise _misfit("a take of weights", "a take of markers")
+    if rig is None:
         _draw_markers(grid, take.source.values, frames)
-    elif rig is None:
-        raise _misfit("the actor's rig, for a take of weights", "none")
     else:
         _draw_face(grid, actor_face(take, rig), frames)
     for axes, heading in zip(grid, headings, strict=False):
         axes.set_title(heading, fontsize=9, color=INK, pad=3)
     return figure
+
+
+def require_drawable(take: Take, rig: Rig | None) -> None:
+    """Check that there is a rig to draw a take of weights, and none for markers.
+
+    Raises
+    ------
+    InputError
+        When there is not.
+    """
+    if take.source.kind == "markers" and rig is not None:
+        raise _misfit("a take of weights", "a take of markers")
+    if take.source.kind == "weights" and rig is None:
+        raise _misfit("the actor's rig, for a take of weights", "none")
 
 
 def actor_face(take: Take, rig: Rig) -> Face:

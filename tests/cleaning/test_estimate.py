@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from facert.cleaning import smoothing
 from facert.cleaning.estimate import (
     LONGEST,
     estimate,
@@ -101,6 +102,36 @@ def test_smoothing_series_is_regression_of_each():
         gain = np.linalg.solve(prior[np.ix_(s, s)] + noise * np.eye(s.sum()), prior[s]).T
         np.testing.assert_allclose(mean[:, j], gain @ X[s, j], atol=1e-8)
         np.testing.assert_allclose(left[:, j], np.diag(prior - gain @ prior[s]), atol=1e-8)
+
+
+def with_a_gap(frames=120):
+    """Which of three columns is seen: all, but for one that is hidden for a while."""
+    seen = np.ones((frames, 3), dtype=bool)
+    seen[50:70, 1] = False
+    return seen
+
+
+def test_where_knowledge_has_settled_no_more_of_it_is_worked_out_and_nothing_changes(monkeypatch):
+    rng, a = np.random.default_rng(4), np.array([0.1, 0.7])
+    W, seen = rng.normal(size=(3, 2)), with_a_gap()
+    precision = np.stack([W.T @ np.diag(100.0 * there) @ W for there in seen])
+    factors = precision, 100.0 * rng.normal(size=(120, 2)), a
+    series = rng.normal(size=(120, 3)), seen, np.array([0.5, 1.0, 4.0]), 0.3, np.r_[a, 3.0]
+    quick, quick_series = smooth_factors(*factors), smooth_series(*series)
+    monkeypatch.setattr(smoothing, "SETTLED", -1.0)
+    whole, whole_series = smooth_factors(*factors), smooth_series(*series)
+    for name in ("mean", "covariance", "following"):
+        np.testing.assert_allclose(getattr(quick, name), getattr(whole, name), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(quick_series, whole_series, rtol=1e-7, atol=1e-9)
+
+
+def test_knowledge_settles_where_frames_show_the_same_and_moves_on_where_they_do_not():
+    F, seen = transition(np.full(3, 0.5)), with_a_gap()
+    known = [id(k) for k in smoothing._series_filtered(seen, np.ones(3), 0.1, F)]
+    assert len(set(known[40:50])) == len(set(known[110:])) == 1
+    assert len(set(known)) > 20
+    assert known[49] != known[50]
+    assert known[69] != known[70]
 
 
 def test_factors_are_learned_through_gaps():

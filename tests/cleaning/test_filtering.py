@@ -29,9 +29,20 @@ def motion(noisy):
 
 
 def filtered(motion, X, sigma=SIGMA):
-    stream = MotionFilter(motion, sigma)
-    mean, variance = zip(*(stream.step(frame) for frame in X), strict=True)
+    stream, found = MotionFilter(motion, sigma), []
+    for frame in X:
+        seen = ~np.isnan(frame)
+        found.append((stream.step(frame, None if seen.all() else seen), stream.variance))
+    mean, variance = zip(*found, strict=True)
     return np.array(mean), np.array(variance)
+
+
+def stepped(part, X, seen):
+    """What a part of the filter makes of the last frame."""
+    for frame, there in zip(X, seen, strict=True):
+        part.look_ahead()
+        mean = part.step(frame, there)
+    return mean
 
 
 def rms(values):
@@ -44,17 +55,17 @@ def test_after_its_last_frame_a_filter_knows_what_the_smoother_knows(motion, noi
     X = np.where(np.random.default_rng(1).random(noisy.shape) < 0.3, np.nan, noisy)[:40]
     factors, seen = motion.seen_with(SIGMA), ~np.isnan(X)
     shared = _FactorFilter(factors, motion.rates)
-    last = [shared.step(frame, there) for frame, there in zip(X, seen, strict=True)][-1]
+    last = stepped(shared, X, seen)
     found = smooth_factors(*factors.information(X), motion.rates)
-    np.testing.assert_allclose(last[0], factors.frames(found.mean)[-1], atol=1e-8)
-    np.testing.assert_allclose(last[1], factors.variance(found.covariance)[-1], atol=1e-8)
+    np.testing.assert_allclose(last, factors.frames(found.mean)[-1], atol=1e-8)
+    np.testing.assert_allclose(shared.variance, factors.variance(found.covariance)[-1], atol=1e-8)
 
     series = _SeriesFilter(motion.rest, motion.rest_rates, SIGMA**2)
     values = np.where(seen, X, 0.0)
-    last = [series.step(frame, there) for frame, there in zip(values, seen, strict=True)][-1]
+    last = stepped(series, values, seen)
     mean, variance = smooth_series(X, seen, motion.rest, SIGMA**2, motion.rest_rates)
-    np.testing.assert_allclose(last[0], mean[-1], atol=1e-8)
-    np.testing.assert_allclose(last[1], variance[-1], atol=1e-8)
+    np.testing.assert_allclose(last, mean[-1], atol=1e-8)
+    np.testing.assert_allclose(series.variance, variance[-1], atol=1e-8)
 
 
 def test_noise_is_halved_in_frames_it_has_not_learned_from(motion, frames, noisy):
@@ -100,7 +111,7 @@ def test_rates_are_for_a_time_not_for_a_frame(motion):
 
 
 def test_zeros_and_held_markers_are_bad_while_others_move():
-    rng, watch = np.random.default_rng(0), MarkerWatch()
+    rng, watch = np.random.default_rng(0), MarkerWatch(6)
     frames = rng.normal(size=(20, 6, 3))
     frames[5:15, 2] = frames[4, 2]
     frames[8, 3] = 0.0
@@ -112,7 +123,7 @@ def test_zeros_and_held_markers_are_bad_while_others_move():
 
 
 def test_a_face_at_rest_and_doubled_frames_are_not_held():
-    rng, watch = np.random.default_rng(0), MarkerWatch()
+    rng, watch = np.random.default_rng(0), MarkerWatch(5)
     frames = np.repeat(rng.normal(size=(6, 5, 3)), 6, axis=0)
     assert not np.array([watch.step(frame) for frame in frames]).any()
 

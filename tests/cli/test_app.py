@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from facert.cli import app, inspect
+from facert.io.formats import write_take_file
 
 
 def test_a_name_that_is_too_long_is_one_line(facert, tmp_path):
@@ -35,3 +36,18 @@ def test_ctrl_c_says_stopped(facert, monkeypatch):
     monkeypatch.setattr(inspect, "_facts", interrupted)
     stopped = facert("inspect", app.__file__)
     assert (stopped.code, stopped.err) == (130, "stopped\n")
+
+
+@pytest.mark.parametrize("option", ["-q", "--quiet"])
+def test_messages_are_asked_for_before_or_after_the_command(facert, make_take, tmp_path, option):
+    take = tmp_path / "take.h5"
+    write_take_file(make_take(), take)
+    noted = ("suggest", take, "-n", 3, "--have", "labels")
+    assert "goes on from 12 posed frames" in facert(*noted).err
+    assert facert(option, *noted).err == facert(*noted, option).err == ""
+
+
+def test_what_follows_two_dashes_is_a_name(facert):
+    refused = facert("inspect", "--", "-q")
+    assert refused.code == 3
+    assert refused.err.startswith("error: -q: file: expected an existing file")

@@ -74,3 +74,21 @@ def test_in_and_out_or_a_folder_for_the_results(facert, folder):
     empty = folder / "empty"
     empty.mkdir()
     assert facert("clean", empty, "--out-dir", folder / "out").code == 3
+
+
+@pytest.mark.parametrize("option", [("--jobs", 2), ("--ending", ".csv")])
+def test_options_for_many_files_are_refused_for_one(facert, folder, option):
+    done = facert("clean", folder / "take0.h5", folder / "out.h5", *option)
+    assert done.code == 2
+    assert f"{option[0]} is for many files" in done.err
+
+
+def test_a_result_that_cannot_be_written_is_refused_before_the_takes_are_read(facert, folder):
+    for command in ("clean", "retarget"):
+        done = facert(command, folder / "none.h5", folder / "out.fbx")
+        assert done.code == 3
+        assert "out.fbx: output's ending" in done.err
+    done = facert("clean", folder, "--out-dir", folder / "out", "--ending", ".fbx")
+    assert done.code == 3
+    assert "output's ending" in done.err
+    assert not (folder / "out").exists()

@@ -50,7 +50,7 @@ def test_meshes_become_a_rig(facert, tmp_path):
     for name in ("neutral", "smile"):
         (folder / f"{name}.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     done = facert("convert", folder, tmp_path / "rig.h5")
-    assert "3 vertices and 1 shapes" in done.out
+    assert "3 vertices and 1 shape" in done.out
     assert read_rig_file(tmp_path / "rig.h5").names == ("smile",)
 
 
@@ -165,7 +165,7 @@ def test_poses_of_another_file_become_labels(facert, capture, tmp_path):
     poses = tmp_path / "poses.csv"
     poses.write_text("frame,jaw,smile\n2,0.5,0.25\n0,0,0\n")
     done = facert("convert", capture, tmp_path / "take.h5", "--poses", poses)
-    assert "3 frames of 1 markers and 2 poses" in done.out
+    assert "3 frames of 1 marker and 2 poses" in done.out
     take = read_take_file(tmp_path / "take.h5")
     assert take.labels.tolist() == [0, 2]
     assert take.params[2].tolist() == [0.5, 0.25]

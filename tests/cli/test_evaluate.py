@@ -151,3 +151,23 @@ def test_a_rig_is_matched_in_its_own_spelling(facert, real_data):
     outcome = facert("eval", track, "--target", "units", "--rig", rig, *QUICK)
     assert outcome.code == 3
     assert "controls that the rig has a shape for, found 'eye-left-closure'" in outcome.err
+
+
+def test_a_device_that_is_not_there_is_wrong_usage_before_any_cell(facert, take):
+    failed = facert("eval", take, "--device", "cuda:99")
+    assert failed.code == 2
+    assert "--device cuda:99" in failed.err
+    assert failed.out == ""
+
+
+def test_a_take_with_a_few_posed_frames_needs_no_option(facert, make_take, tmp_path):
+    path = tmp_path / "posed.h5"
+    write_take(make_take(frames=90, posed=12, animation=0), path)
+    outcome = facert("eval", path, "--methods", "ridge,nearest", "--repeats", 3, "--jobs", 1)
+    assert outcome.code == 0, outcome.err
+    assert "learns from 3 or 6 or 9 of 12 posed frames and 78 frames without a pose" in outcome.err
+    assert "cannot run" not in outcome.out
+    write_take(make_take(frames=90, posed=3, animation=0), path, overwrite=True)
+    outcome = facert("eval", path)
+    assert outcome.code == 3
+    assert "posed.h5: /target/params: expected 4 posed frames at least" in outcome.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import socket
@@ -22,7 +23,7 @@ from pythonosc.osc_server import BlockingOSCUDPServer
 
 import facert as api
 from facert import Settings
-from facert.data import Controls, Source
+from facert.data import Controls, Source, Take
 from facert.names import ARKIT_SHAPES
 
 PATIENCE = 60.0
@@ -73,6 +74,35 @@ def test_a_take_is_played_recorded_and_retargeted_as_in_a_stream(facert, files, 
     assert f"{len(take)} received" in done.out
     assert "frames/s, latency" in done.out
     assert f"wrote {tmp_path / 'in.h5'}" in done.out
+
+
+def test_the_first_seconds_may_show_the_actor_at_rest(facert, files, take, tmp_path):
+    """A tracker that is off by a tenth, played from a long rest in the model's neutral pose."""
+    _, model = files
+    neutral = api.load(model).neutral
+    values = np.vstack([np.tile(neutral, (30, 1)), take.source.values]) + 0.1
+    time = np.arange(len(values)) / take.fps
+    shifted = Take(time, Source(values, SHAPES), fps=take.fps)
+    api.write_take(shifted, tmp_path / "shifted.h5")
+    done = facert(
+        "live", "--in", f"take:{tmp_path / 'shifted.h5'}", "-m", model, "--speed", 8,
+        "--out", f"h5:{tmp_path / 'out.h5'}", "--neutral", 0.5,
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "rests" in done.err
+    assert "calibrated" in done.err
+    result = api.read_take(tmp_path / "out.h5")
+    mapped = np.rint(result.time * take.fps).astype(int) - 30
+    later = mapped >= 10
+    plain = api.load(model).retarget(take, "online").params[mapped[later]]
+    assert np.abs(result.params[later] - plain).mean() < 0.5 * np.abs(plain).mean()
+
+
+def test_a_session_leaves_the_priority_of_its_process_as_it_was(facert, files):
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    done = facert("live", "--in", f"take:{files[0]}", "-m", files[1], "--frames", 2, "--out", "vmc")
+    assert done.code == 0, done.err
+    assert os.getpriority(os.PRIO_PROCESS, 0) == before
 
 
 def test_the_summary_is_there_for_programs(facert, files):

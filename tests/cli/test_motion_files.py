@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import trimesh
 
 from facert.data import Controls, MeshSequence, Rig, Source, Take
+from facert.io.gltf_rig import read_gltf_mesh
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.io.rig import read_rig, write_rig
 from facert.io.take import write_take
@@ -42,20 +44,20 @@ def test_a_mesh_sequence_is_summed_up(facert, folder: Path) -> None:
 
 def test_a_mesh_sequence_becomes_a_glb(facert, folder: Path) -> None:
     outcome = facert("convert", folder / "face.h5", folder / "face.glb")
-    assert "24 frames of 1 morph targets" in outcome.out
+    assert "24 frames of 1 morph target" in outcome.out
     assert trimesh.load_scene(folder / "face.glb").extents[0] == pytest.approx(0.02)
 
 
 def test_a_take_becomes_a_glb_of_the_shapes_that_it_moves(facert, folder: Path) -> None:
     outcome = facert("convert", folder / "take.h5", folder / "a.glb", "--rig", folder / "rig.h5")
-    assert "24 frames of 1 morph targets" in outcome.out
+    assert "24 frames of 1 morph target" in outcome.out
     assert b'"targetNames":["up"]' in (folder / "a.glb").read_bytes()
 
 
 def test_a_take_becomes_usd(facert, folder: Path) -> None:
     pytest.importorskip("pxr", reason="needs usd-core")
     arguments = ("convert", folder / "take.h5", folder / "a.usda", "--rig", folder / "rig.h5")
-    assert "24 frames of 1 morph targets" in facert(*arguments).out
+    assert "24 frames of 1 morph target" in facert(*arguments).out
     assert 'def BlendShape "up"' in (folder / "a.usda").read_text()
     assert facert("convert", folder / "face.h5", folder / "face.usdc").code == 0
 
@@ -74,7 +76,7 @@ def test_an_animated_glb_is_a_rig_or_a_take(facert, folder: Path) -> None:
     facert("convert", folder / "take.h5", glb, "--rig", folder / "rig.h5")
     assert "a rig" in facert("convert", glb, folder / "b.h5").out
     assert "a take" in facert("convert", glb, folder / "c.h5", "--kind", "take").out
-    assert "a take" in facert("convert", glb, folder / "c.json").out
+    assert "24 frames of 1 weight" in facert("convert", glb, folder / "c.json").out
     assert "24 frames" in facert("convert", glb, folder / "d.glb", "--rig", glb).out
 
 
@@ -82,8 +84,8 @@ def test_tracked_weights_move_a_rig_of_their_names(facert, folder: Path) -> None
     (folder / "face.csv").write_text("time,Up,headYaw\n0,0.5,9\n0.1,,9\n0.2,1,9\n")
     arguments = ("convert", folder / "face.csv", folder / "e.glb", "--rig", folder / "rig.h5")
     done = facert(*arguments)
-    assert "2 frames of 1 morph targets" in done.out
-    assert "1 weights move nothing: headYaw" in done.err
+    assert "2 frames of 1 morph target" in done.out
+    assert "no shape for 1 weight, left out: headYaw" in done.err
 
 
 def test_options_for_takes_are_refused_for_a_mesh_sequence(facert, folder: Path) -> None:
@@ -95,3 +97,34 @@ def test_options_for_takes_are_refused_for_a_mesh_sequence(facert, folder: Path)
 def test_a_take_without_a_rig_is_no_glb(facert, folder: Path) -> None:
     outcome = facert("convert", folder / "take.h5", folder / "a.glb")
     assert (outcome.code, "--rig" in outcome.err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    ("unit", "options", "width"),
+    [
+        ("mm", (), 0.002),
+        ("centimetres", (), 0.02),
+        ("", ("--in-units", "cm"), 0.02),
+        ("", ("--in-units", "mm", "--units", "m"), 0.002),
+        ("cm", ("--units", "mm"), 0.02),
+        ("cm", ("--in-units", "m"), 2.0),
+    ],
+)
+def test_a_glb_is_as_large_as_the_face_in_metres(
+    facert, folder: Path, unit: str, options: tuple[str, ...], width: float
+) -> None:
+    """Whatever unit the numbers of the rig are in, and whether it moves."""
+    rig, out = folder / "unit.h5", folder / "out.glb"
+    write_rig(replace(RIG, units=unit), rig)
+    for given in ((rig,), (folder / "take.h5", "--rig", rig)):
+        done = facert("convert", given[0], out, *given[1:], *options, "--overwrite")
+        assert done.code == 0, done.err
+        assert read_gltf_mesh(out).vertices[:, 0].max() == pytest.approx(width / 2)
+        assert "does not say its unit" not in done.err or "--units" in options
+
+
+def test_a_glb_of_numbers_without_a_unit_is_warned_of(facert, folder: Path) -> None:
+    write_rig(replace(RIG, units=""), folder / "unit.h5")
+    done = facert("convert", folder / "unit.h5", folder / "out.glb")
+    assert done.code == 0
+    assert "--in-units cm" in done.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -92,3 +93,39 @@ def test_an_empty_folder_is_refused(facert, tmp_path) -> None:
     done = facert("report", tmp_path, "-o", tmp_path / "page.html")
     assert done.code == 3
     assert "none" in done.err
+
+
+def test_results_in_columns_are_shown_as_well_once_and_against_the_truth(facert, folder) -> None:
+    page, result = folder / "page.html", api.read_take(folder / "result.h5")
+    api.write_take(result, folder / "result.json")  # the same result again
+    (folder / "result.h5").rename(folder / "result.hdf5")
+    api.write_take(result, folder / "table.csv")
+    api.write_take(result, folder / "curves.json")
+    done = facert("report", folder, "-o", page)
+    assert done.code == 0, done.err
+    titles = re.findall("<h2>(.*?)</h2>", page.read_text())
+    names = ("result.hdf5", "curves.json", "table.csv")
+    assert titles == [f"Performance: {name}" for name in names] + ["Model: model.safetensors"]
+    assert page.read_text().count("data:image/png") == 3  # the rig of the folder fits all
+    assert len(set(re.findall("<p>(RMS to the truth .*?)</p>", page.read_text()))) == 1
+    assert facert("report", folder / "table.csv", "-o", folder / "one.html").code == 0
+
+
+def test_what_a_method_without_deviations_wrote_is_not_passed_over(facert, folder) -> None:
+    result = api.read_take(folder / "result.h5")
+    (folder / "result.h5").unlink()
+    (folder / "truth.h5").unlink()
+    api.write_take(replace(result, std=None), folder / "plain.h5")
+    assert facert("report", folder, "-o", folder / "page.html").code == 0
+    assert "Performance: plain.h5" in (folder / "page.html").read_text()
+
+
+def test_long_curves_make_no_large_page(facert, folder, make_take) -> None:
+    sizes = []
+    for frames in (2000, 8000):
+        take = make_take(frames=frames, posed=frames, animation=0)
+        api.write_take(take, folder / "long.h5", overwrite=True)
+        page = folder / f"{frames}.html"
+        assert facert("report", folder / "long.h5", "-o", page).code == 0
+        sizes.append(page.stat().st_size)
+    assert sizes[1] < 2 * sizes[0]

@@ -223,3 +223,11 @@ def test_a_bad_file_of_controls_is_told(facert, files, tmp_path, text, word):
     assert word in done.err
     assert "controls.toml" in done.err
     assert not out.exists()
+
+
+def test_a_device_that_is_not_there_is_wrong_usage(facert, files):
+    take, out, model = files
+    failed = facert("retarget", take, out, "--model", model, "--device", "cuda:99")
+    assert failed.code == 2
+    assert "--device cuda:99" in failed.err
+    assert not out.exists()

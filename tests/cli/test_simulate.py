@@ -18,7 +18,7 @@ def inputs(tmp_path):
 def test_a_capture_with_its_truth_is_written(facert, inputs, tmp_path):
     done = facert("simulate", *inputs, tmp_path / "take.h5", "--markers", 12, "--noise", 0.1)
     assert done.code == 0
-    assert "3 frames of 12 markers, 2 parameters" in done.out
+    assert "3 frames of 12 markers, 2 controls" in done.out
     take = read_take_file(tmp_path / "take.h5")
     assert take.controls.names == ("JawOpen", "SmileLeft")
     assert take.units == "cm"

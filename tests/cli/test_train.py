@@ -344,3 +344,29 @@ def test_the_log_goes_on_where_a_stopped_run_left_it(facert, make_take, slow, mo
 )
 def test_numbers_are_shown_as_short_as_they_can_be(value, shown):
     assert _shown(value) == shown
+
+
+def test_training_begins_at_a_model_with_its_settings(facert, take, model, tmp_path):
+    assert facert("train", take, "-o", model, *QUICK, *SHARED).code == 0
+    again = tmp_path / "again.safetensors"
+    assert facert("train", take, "-o", again, "--start", model).code == 0
+    first, second = api.load(model), api.load(again)
+    assert second.settings == first.settings
+    assert second.figures["iterations"] < first.figures["iterations"] / 3
+
+
+def test_options_come_before_the_settings_of_the_start(facert, take, model, tmp_path):
+    assert facert("train", take, "-o", model, *QUICK, *SHARED).code == 0
+    again = tmp_path / "again.safetensors"
+    assert facert("train", take, "-o", again, "--start", model, "--seed", 5).code == 0
+    assert api.load(again).settings.seed == 5
+    done = facert("train", take, "-o", again, "--start", model, "--latent-dim", 2, "--overwrite")
+    assert done.code == 3
+    assert "the start's latent_dim: expected 2, found 3" in done.err
+
+
+def test_for_a_method_that_learns_in_one_go_a_start_is_idle(facert, take, model, tmp_path):
+    assert facert("train", take, "-o", model, "--method", "ridge").code == 0
+    done = facert("train", take, "-o", tmp_path / "b.safetensors", "--start", model)
+    assert done.code == 0
+    assert "ridge learns in one go: nothing to do for --start" in done.err

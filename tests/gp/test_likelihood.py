@@ -104,6 +104,16 @@ def test_the_compact_factor_changes_neither_value_nor_gradient(problem):
     torch.testing.assert_close(*(torch.autograd.grad(v, Z)[0] for v in (compact, full)))
 
 
+def test_directions_whose_square_is_lost_in_rounding_are_left_out():
+    rng = np.random.default_rng(0)
+    large, small = rng.normal(size=(30, 4)) @ rng.normal(size=(4, 9)), rng.normal(size=(30, 9))
+    X = torch.from_numpy(large + 1e-9 * small)
+    F = compact_factor(X)
+    assert F.shape == (30, 4)
+    torch.testing.assert_close(F @ F.T, X @ X.T, rtol=0.0, atol=1e-12)
+    assert compact_factor(torch.from_numpy(large + 1e-5 * small)).shape == (30, 9)
+
+
 def test_observations_that_are_all_zero_have_a_factor_without_columns(problem):
     Z, log_kernel, X = problem
     F = compact_factor(torch.zeros_like(X))

@@ -34,8 +34,10 @@ def test_energy_gradient_and_hessian_are_those_of_the_batch(mapping, missing):
     Z = np.random.default_rng(2).normal(size=(20, LATENT))
     batch = mapping._expand(Z, observed)
     for row, z in enumerate(Z):
-        at, gradient, hessian = mapping._frame.expand(z, observed.mean[row], observed.variance[row])
-        assert at.energy == pytest.approx(batch.energy[row], rel=1e-12)
+        of_frame = observed.mean[row], observed.variance[row]
+        energy, gradient, hessian = mapping._frame.expand(mapping._frame.stand(z), *of_frame)
+        assert energy == mapping._frame.energy(z, *of_frame)
+        assert energy == pytest.approx(batch.energy[row], rel=1e-12)
         np.testing.assert_allclose(gradient, batch.gradient[row], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(hessian, batch.hessian[row], rtol=1e-9, atol=1e-9)
 
@@ -79,10 +81,24 @@ def test_descent_is_refused_above_the_energy_given_and_on_a_saddle(mapping):
     observed = performance(mapping, 0.0, frames=1)
     b, R = observed.mean[0], observed.variance[0]
     (z,) = mapping.solve(observed).z
-    least = mapping._frame.energy(z, b, R)
-    assert mapping._frame.descend(z, b, R, least + 1.0) is not None
-    assert mapping._frame.descend(z, b, R, least - 1.0) is None
+    frame = mapping._frame
+    least = frame.energy(z, b, R)
+    assert frame.descend(frame.stand(z), b, R, least + 1.0) is not None
+    assert frame.descend(frame.stand(z), b, R, least - 1.0) is None
     starts = np.random.default_rng(4).normal(scale=2.0, size=(200, LATENT))
-    curved = [z for z in starts if np.linalg.eigvalsh(mapping._frame.expand(z, b, R)[2])[0] < 0]
+    stands = [frame.stand(start) for start in starts]
+    curved = [s for s in stands if np.linalg.eigvalsh(frame.expand(s, b, R)[2])[0] < 0]
     assert curved
-    assert all(mapping._frame.descend(z, b, R) is None for z in curved)
+    assert all(frame.descend(stand, b, R) is None for stand in curved)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3])
+def test_to_begin_where_the_frame_before_stood_is_as_good_as_to_begin_at_its_z(mapping, missing):
+    observed = performance(mapping, missing, frames=40)
+    mapped = mapping.solve(observed[:1])
+    for row in range(1, 40):
+        plain = mapping.follow(observed[row : row + 1], mapped.z)
+        mapped = mapping.follow(observed[row : row + 1], mapped.z, mapped.stand)
+        np.testing.assert_allclose(mapped.z, plain.z, atol=1e-4)
+        np.testing.assert_allclose(mapped.x, plain.x, atol=1e-4)
+        assert mapped.energy[0] == pytest.approx(plain.energy[0], abs=1e-6)

@@ -4,7 +4,7 @@ import pytest
 from facert.gplvm.alignment import align
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
-from facert.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, placed, spread
+from facert.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, Start, spread
 from facert.gplvm.training import train
 from facert.optim.lbfgs import LBFGS
 from facert.optim.monitor import Monitor
@@ -68,14 +68,12 @@ def test_rows_of_the_core_stay_and_the_others_are_placed_where_their_view_explai
     views, trained
 ):
     (X, Y), (core, module) = views, trained
-    Z = placed(module, X, Y, LABELLED, core)
+    posteriors = module.source_posterior(X[core.rows_x]), module.target_posterior(Y[core.rows_y])
+    Z = Start.at(*posteriors).latents(X, Y, LABELLED)
     assert Z.shape == (LABELLED + 360, 2)
     np.testing.assert_array_equal(Z[core.rows_x], module.latents_x)
     Z_y = np.vstack([Z[:LABELLED], Z[len(X) :]])
     np.testing.assert_array_equal(Z_y[core.rows_y], module.latents_y)
-    for Z_view, view, posterior in (
-        (Z[: len(X)], X, module.source_posterior(X[core.rows_x])),
-        (Z_y, Y, module.target_posterior(Y[core.rows_y])),
-    ):
+    for Z_view, view, posterior in zip((Z[: len(X)], Z_y), (X, Y), posteriors, strict=True):
         error = np.abs(posterior.predict(Z_view).mean - view)
         assert error.mean() < 0.1 * view.std()

@@ -1,15 +1,19 @@
 import json
 import logging
+from dataclasses import replace
 
 import ezc3d
 import numpy as np
 import pytest
 
-from facert.data import Rig, Source, Take
-from facert.errors import InputError
+from facert.data import Controls, Rig, Source, Take
+from facert.errors import InputError, OutputExistsError
 from facert.io import formats
 from facert.io.glb import write_glb
+from facert.io.poses import read_poses
+from facert.labelling import labelled
 from facert.morphs import rig_morphs
+from facert.names import ARKIT_SHAPES
 
 TAKE = Take(time=[0.0, 0.5], source=Source(np.array([[0.0], [1.0]]), ["jawOpen"]), fps=2.0)
 RIG = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))
@@ -122,3 +126,38 @@ def test_of_a_glb_with_both_each_reader_gets_its_own(tmp_path, caplog):
     assert not caplog.records
     assert isinstance(formats.read_any(tmp_path / "face.glb"), Rig)
     assert "its animation is a take as well" in caplog.text
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.json"])
+def test_a_few_poses_without_their_recording_are_told_how_to_come_back(
+    make_take, tmp_path, name, caplog
+):
+    take = make_take(frames=30, posed=4)
+    formats.write_take_file(take, tmp_path / name)
+    assert f"{name} holds 4 poses and not what was recorded" in caplog.text
+    # As the warning says, the two together are what was there before.
+    back = labelled(replace(take, params=None, animation=None), read_poses(tmp_path / name))
+    np.testing.assert_array_equal(back.labels, take.labels)
+    np.testing.assert_allclose(back.params, take.params, atol=1e-9)
+
+
+def test_a_few_poses_for_live_link_are_told_to_lose_their_frames(make_take, tmp_path, caplog):
+    take = replace(make_take(frames=30, posed=4), controls=Controls(ARKIT_SHAPES[:4]))
+    formats.write_take_file(take, tmp_path / "a.livelink.csv")
+    assert "only a .csv, .json or .h5 tells of which frames" in caplog.text
+
+
+@pytest.mark.parametrize("posed", [0, 30])
+def test_a_file_of_one_matrix_that_is_whole_needs_no_word(make_take, tmp_path, posed, caplog):
+    formats.write_take_file(make_take(frames=30, posed=posed), tmp_path / "a.csv")
+    formats.write_take_file(make_take(frames=30, posed=4), tmp_path / "a.h5")
+    assert not caplog.records
+
+
+def test_an_output_is_refused_before_any_work(tmp_path):
+    (tmp_path / "there.h5").write_text("mine")
+    with pytest.raises(OutputExistsError, match=r"there\.h5"):
+        formats.require_take_output(tmp_path / "there.h5", overwrite=False)
+    with pytest.raises(InputError, match=r"\.livelink\.csv, \.csv, \.json, found '\.glb'"):
+        formats.require_take_output(tmp_path / "a.glb", overwrite=True)
+    formats.require_take_output(tmp_path / "there.h5", overwrite=True)

@@ -1,25 +1,19 @@
-"""Rigs and animations come out of glTF files of other programs; hostile files do no harm."""
+"""Rigs and animations come out of glTF files of other programs."""
 
 from __future__ import annotations
 
 import base64
 import json
-import struct
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pygltflib as gltf
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from facert.data import Rig
 from facert.errors import InputError
 from facert.io.glb import write_glb
-from facert.io.gltf import open_gltf
 from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
 from facert.io.gltf_take import holds_animation, read_gltf_take
 from facert.io.livelink import read_livelink
@@ -293,122 +287,3 @@ def test_a_rig_without_an_animation_holds_no_take(builder: Builder, tmp_path: Pa
 def test_targets_without_names_are_numbered(builder: Builder, tmp_path: Path) -> None:
     builder.document.meshes[0].extras = {}
     assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == ("target1", "target2")
-
-
-def glb(root: dict[str, Any], content: bytes) -> bytes:
-    text = json.dumps(root).encode()
-    text += b" " * (-len(text) % 4)
-    total = 28 + len(text) + len(content)
-    return (
-        struct.pack("<III", 0x46546C67, 2, total)
-        + struct.pack("<II", len(text), 0x4E4F534A) + text
-        + struct.pack("<II", len(content), 0x004E4942) + content
-    )  # fmt: skip
-
-
-def rewritten(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:
-    """The file of Blender with its JSON changed."""
-    with open_gltf(BLENDER) as document:
-        root = json.loads(json.dumps(document.root))
-        change(root)
-        path.write_bytes(glb(root, document.buffers[0]))
-
-
-def at(*keys: Any) -> Callable[[Any], Callable[[dict[str, Any]], None]]:
-    """Sets what stands at a place of the JSON."""
-
-    def to(value: Any) -> Callable[[dict[str, Any]], None]:
-        def change(root: Any) -> None:
-            for key in keys[:-1]:
-                root = root[key]
-            root[keys[-1]] = value
-
-        return change
-
-    return to
-
-
-HOSTILE = {
-    "a count beyond the bytes": at("accessors", 0, "count")(10**6),
-    "a count beyond all memory": at("accessors", 0, "count")(10**15),
-    "a count beyond all memory and no bytes": at("accessors", 0)(
-        {"componentType": 5126, "count": 10**12, "type": "VEC3"}
-    ),
-    "a negative offset": at("bufferViews", 0, "byteOffset")(-84),
-    "an offset beyond the bytes": at("bufferViews", 0, "byteOffset")(10**9),
-    "a stride beyond the bytes": at("bufferViews", 0, "byteStride")(10**9),
-    "an offset that is text": at("bufferViews", 0, "byteOffset")("x"),
-    "a view that is not there": at("accessors", 0, "bufferView")(99),
-    "an accessor that is not there": at("meshes", 0, "primitives", 0, "attributes", "POSITION")(99),
-    "an unknown type": at("accessors", 0, "componentType")(1),
-    "indices beyond the vertices": at("meshes", 0, "primitives", 0, "indices")(8),
-    "a mesh of text": at("meshes")("none"),
-    "nodes that are no list": at("nodes")(7),
-    "a node that is not there": at("scenes", 0, "nodes")([5]),
-    "a rotation of nothing": at("nodes", 0, "rotation")([0, 0, 0, 0]),
-    "a matrix that is too small": at("nodes", 0, "matrix")([1, 2]),
-    "fewer names than targets": at("meshes", 0, "extras", "targetNames")(["smile"]),
-    "one name for two targets": at("meshes", 0, "extras", "targetNames")(["a", "a"]),
-    "a name that upsets a terminal": at("meshes", 0, "extras", "targetNames")(["\x1b[2J", "b"]),
-    "a file elsewhere": at("buffers", 0, "uri")("../../etc/passwd"),
-    "a file elsewhere in other signs": at("buffers", 0, "uri")("%2e%2e%2fpasswd"),
-    "the folder above": at("buffers", 0, "uri")(".."),
-    "an address": at("buffers", 0, "uri")("file:///etc/passwd"),
-    "no base64": at("buffers", 0, "uri")("data:a;base64,%%%"),
-    "another version": at("asset", "version")("1.0"),
-    "compression": at("extensionsRequired")(["KHR_draco_mesh_compression"]),
-}
-
-
-@pytest.mark.parametrize("what", HOSTILE)
-def test_a_hostile_rig_is_one_error(tmp_path: Path, what: str) -> None:
-    path = tmp_path / "face.glb"
-    rewritten(path, HOSTILE[what])
-    with pytest.raises(InputError) as caught:
-        read_gltf_rig(path)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        at("animations", 0, "channels", 0, "sampler")(4),
-        at("animations", 0, "channels", 0, "target", "node")(4),
-        at("animations", 0, "samplers", 0, "input")(8),
-        at("animations", 0, "samplers", 0, "output")(7),
-        at("animations", 0, "samplers", 0, "interpolation")("CUBICSPLINE"),
-        at("animations")("none"),
-    ],
-)
-def test_a_hostile_animation_is_one_error(tmp_path: Path, change: Any) -> None:
-    path = tmp_path / "face.glb"
-    rewritten(path, change)
-    with pytest.raises(InputError) as caught:
-        read_gltf_take(path)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-def test_nodes_that_are_each_others_children_end(tmp_path: Path) -> None:
-    rewritten(tmp_path / "a.glb", at("nodes", 0, "children")([0]))
-    assert read_gltf_rig(tmp_path / "a.glb").names == ("smile", "blink")
-
-
-@pytest.mark.parametrize("size", [0, 3, 11, 19, 40, 2000])
-def test_a_file_that_is_cut_short_is_refused(tmp_path: Path, size: int) -> None:
-    path = tmp_path / "face.glb"
-    path.write_bytes(BLENDER.read_bytes()[:size])
-    with pytest.raises(InputError):
-        read_gltf_rig(path)
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 2527), st.integers(0, 255)), min_size=1, max_size=4))
-def test_damaged_bytes_give_a_face_or_one_error(tmp_path_factory, changes) -> None:
-    path = tmp_path_factory.getbasetemp() / "damaged.glb"
-    content = bytearray(BLENDER.read_bytes())
-    for place, value in changes:
-        content[place] = value
-    path.write_bytes(content)
-    for read in (read_gltf_rig, read_gltf_take):
-        with suppress(InputError):
-            assert read(path) is not None

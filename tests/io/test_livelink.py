@@ -17,6 +17,7 @@ from facert.io.livelink import (
 )
 from facert.io.rate import nominal_rate
 from facert.names import ARKIT_NAMES, ARKIT_SHAPES
+from facert.timecode import timecode
 
 DAY = 24 * 3600 * 60_000
 
@@ -50,6 +51,31 @@ def test_frames_of_a_timecode_count_sixtieths_of_a_second():
     assert parse_timecode("0:00:01:30") == 90_000
     for wrong in ("13:13:04", "13:61:04:00.0", "13:13:04:60.000", "a:b:c:d", ""):
         assert parse_timecode(wrong) is None
+
+
+def counting(count, rate, seconds=3.0):
+    """Timecodes of rows at a rate, FF counting so many a second, without thousandths."""
+    moments = np.arange(3, int(seconds * rate)) / rate
+    return [f"01:00:{int(t):02d}:{int((t % 1) * count + 1e-6):02d}" for t in moments]
+
+
+@pytest.mark.parametrize(
+    ("count", "rate"), [(60, 30), (60, 60), (30, 30), (24, 24), (25, 25), (50, 50), (60, 15)]
+)
+def test_what_a_second_counts_is_told_from_where_seconds_change(path, count, rate):
+    codes = counting(count, rate)
+    del codes[7:9], codes[rate + 2]
+    write(path, ["jawOpen"], codes, [["1", 0.0]] * len(codes))
+    take = read_livelink(path)
+    assert take.fps == rate
+    assert take.time[-1] == pytest.approx(3 - 4 / rate)
+    # Read alone, by the take's rate, the start says the same moment.
+    assert timecode(take.start_timecode, 1 - 3 / rate, take.fps).startswith("01:00:01:00")
+
+
+def test_a_plain_start_timecode_counts_the_takes_frames_when_written(path):
+    write_livelink(weights_take(["jawOpen"], np.zeros((2, 1)), start_timecode="01:00:00:15"), path)
+    assert path.read_text().splitlines()[1].startswith("01:00:00:30.000,")
 
 
 def test_columns_are_found_by_name_in_any_order_and_spelling(path):
@@ -94,8 +120,8 @@ def test_rows_whose_time_does_not_rise_are_dropped_and_counted(path, caplog):
     assert take.source.values[:, 1].tolist() == [0.0, pytest.approx(2 / 51)]
     write(path, timecodes=["01:00:00:02.000", "01:00:00:01.000", "01:00:00:02.000"])
     assert len(read_livelink(path)) == 1
-    assert "dropped 1 rows" in caplog.text
-    assert "dropped 2 rows" in caplog.text
+    assert "dropped 1 row whose" in caplog.text
+    assert "dropped 2 rows whose" in caplog.text
 
 
 @pytest.mark.parametrize("rate", [24.0, 30.0, 60.0])

@@ -40,6 +40,26 @@ def test_positions_times_names_rate_and_unit_are_read(path: Path) -> None:
     assert (take.fps, take.units) == (120.0, "mm")
 
 
+def test_the_column_time_counts_where_the_header_states_another_rate(path: Path, caplog) -> None:
+    path.write_text((HEADER + ROWS).replace("120\t120\t3", "60\t120\t3"))
+    assert read_trc(path).fps == pytest.approx(120)
+    assert "DataRate says 60 frames/s, the column Time 120" in caplog.text
+
+
+@pytest.mark.parametrize("stated", ["120", "119.88", "", "?"])
+def test_a_rate_that_agrees_or_says_nothing_needs_no_word(path: Path, stated: str, caplog) -> None:
+    path.write_text((HEADER + ROWS).replace("120\t120\t3", f"{stated}\t120\t3"))
+    assert read_trc(path).fps == pytest.approx(120, rel=0.01)
+    assert not caplog.records
+
+
+def test_times_in_whole_milliseconds_agree_with_a_rate_that_has_none(path: Path, caplog) -> None:
+    rows = [f"{i + 1}\t{i / 120:.3f}\t1\t2\t3\t4\t5\t6\n" for i in range(60)]
+    path.write_text(HEADER + "".join(rows))
+    assert read_trc(path).fps == 120
+    assert not caplog.records
+
+
 @pytest.mark.parametrize(
     ("line", "lost"),
     [

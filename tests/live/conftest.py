@@ -12,6 +12,7 @@ from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import Frame, frame_pattern
 from facert.live.livelink import LiveLinkEncoder
 from facert.names import ARKIT_NAMES
+from facert.streaming import Streamed
 
 PATIENCE = 20.0
 """Seconds after which a packet on loopback is taken for lost."""
@@ -31,6 +32,28 @@ class Phone:
 
     def send(self, raw: bytes) -> None:
         self.socket.sendto(raw, self.address)
+
+
+class Plain:
+    """A mapper without a memory."""
+
+    def __init__(self, step: Callable[[Frame], Streamed]) -> None:
+        self.step = step
+        self.prepared = 0
+        self.rehearsed: list[float] = []
+
+    def prepare(self) -> None:
+        self.prepared += 1
+
+    def rehearse(self, frame: Frame) -> Streamed:
+        self.rehearsed.append(frame.time)
+        return self.step(frame)
+
+
+@pytest.fixture(scope="session")
+def plain() -> type[Plain]:
+    """Makes a mapper of a function from a frame to its pose."""
+    return Plain
 
 
 @pytest.fixture

@@ -37,11 +37,11 @@ def path(models, tmp_path):
     return shutil.copy(models / "first.safetensors", tmp_path / "model.safetensors")
 
 
-def opened(path, take, pattern=None, fps=None):
+def opened(path, take, pattern=None, fps=None, rest_seconds=None):
     file = ModelFile(path)
     retargeter = file.load()
     like = frame_pattern(take.source.names, "markers", take.units)
-    return LiveModel(file, retargeter, pattern or like, fps or take.fps)
+    return LiveModel(file, retargeter, pattern or like, fps or take.fps, None, rest_seconds)
 
 
 def frames(take):
@@ -133,3 +133,50 @@ def test_a_frame_that_cannot_be_mapped_is_an_error_and_not_a_pose(path, take):
     with pytest.raises(InputError):
         model.step(Frame(0.0, np.full(take.source.values.shape[1:], np.inf), 0.0))
     assert np.isfinite(model.step(frames(take)[0]).params).all()
+
+
+def test_rehearsals_leave_no_trace(path, take):
+    rehearsed, plain = opened(path, take), opened(path, take)
+    for frame in frames(take):
+        said = rehearsed.rehearse(frame)
+        assert np.isfinite(said.params).all()
+        rehearsed.prepare()
+        expected = plain.step(frame).params
+        np.testing.assert_array_equal(rehearsed.step(frame).params, expected)
+
+
+def moved(frame, by):
+    return replace(frame, values=frame.values + by)
+
+
+def test_from_the_seconds_of_rest_on_frames_are_calibrated(path, take, caplog):
+    """Markers stuck on anew, and the actor rests for half a second in the pose of the model."""
+    caplog.set_level(logging.INFO)
+    neutral = facert.load(path).neutral.reshape(-1, 3)
+    by = np.random.default_rng(0).normal(size=neutral.shape)
+    rest = [Frame(number / 30, neutral, 0.0) for number in range(16)]
+    show = [replace(frame, time=frame.time + 16 / 30) for frame in frames(take)]
+    model, plain = opened(path, take, rest_seconds=0.5), opened(path, take)
+    apart = []
+    for frame in [*rest, *show]:
+        said = model.step(moved(frame, by)).params
+        apart.append(np.abs(said - plain.step(frame).params).max())
+        model.prepare()
+        np.testing.assert_allclose(model.rehearse(moved(frame, by)).params.shape, said.shape)
+    assert min(apart[:15]) > 0.05
+    assert max(apart[30:]) < 0.01
+    assert caplog.text.count("calibrated") == 1
+
+
+def test_a_new_model_knows_the_actor_at_rest_as_well(path, take, models, caplog):
+    caplog.set_level(logging.INFO)
+    neutral = facert.load(path).neutral.reshape(-1, 3)
+    first, second = Frame(0.0, neutral + 1.0, 0.0), Frame(0.1, neutral + 1.0, 0.0)
+    with opened(path, take, rest_seconds=0.05) as model:
+        model.step(first), model.step(second), model.prepare()
+        replaced(path, models / "second.safetensors")
+        until(lambda: model.step(second) and "new model is in use" in caplog.text)
+        said = model.step(second).params
+    stream = facert.load(models / "second.safetensors").stream(take.source.names, take.fps)
+    np.testing.assert_allclose(said, stream.step(neutral).params, atol=1e-9)
+    assert np.abs(said - stream.step(neutral + 1.0).params).max() > 0.05

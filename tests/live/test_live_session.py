@@ -23,14 +23,14 @@ def engine():
 
 def copied(frame):
     """The pose of a character that has the actor's own controls."""
-    return Streamed(np.nan_to_num(frame.values), None, frame.values)
+    return Streamed(np.nan_to_num(frame.values), lambda: (None, frame.values))
 
 
-def test_from_a_performer_of_one_library_to_an_engine_of_another(engine):
+def test_from_a_performer_of_one_library_to_an_engine_of_another(engine, plain):
     receiver = open_receiver(Address("vmc", "", 0), "127.0.0.1", frame_pattern(ARKIT_SHAPES))
     to = Address("livelink", "127.0.0.1", engine.getsockname()[1])
     sender = open_sender(to, ARKIT_SHAPES, receiver.counters)
-    session = Session(receiver, copied, [sender])
+    session = Session(receiver, plain(copied), [sender])
     with SimpleUDPClient("127.0.0.1", receiver.port) as client:
         for number in range(1, 6):
             client.send_message("/VMC/Ext/Blend/Val", ["JawOpen", number / 10])
@@ -46,7 +46,7 @@ def test_from_a_performer_of_one_library_to_an_engine_of_another(engine):
     receiver.close(), sender.close()
 
 
-def test_sessions_can_be_chained(receiver, phone, engine):
+def test_sessions_can_be_chained(receiver, phone, engine, plain):
     """Live Link to OSC, OSC to VMC: nothing is lost and time goes on as the phone's did."""
     names = receiver.pattern.source.names
     second = open_receiver(Address("osc", "", 0), "127.0.0.1", frame_pattern(names))
@@ -55,8 +55,8 @@ def test_sessions_can_be_chained(receiver, phone, engine):
     last = open_sender(to, names, second.counters)
     for number in range(10):
         phone.send(phone.packet(number, value=number / 10))
-    Session(receiver, copied, [middle]).run(Limits(frames=10, seconds=20.0))
-    Session(second, copied, [last]).run(Limits(frames=10, seconds=20.0))
+    Session(receiver, plain(copied), [middle]).run(Limits(frames=10, seconds=20.0))
+    Session(second, plain(copied), [last]).run(Limits(frames=10, seconds=20.0))
     stamps = []
     for number in range(10):
         _, face = PyLiveLinkFace.decode(engine.recv(2000))

@@ -1,11 +1,12 @@
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from facert.errors import NumericalError
 from facert.live.frames import Counters, Frame, frame_pattern
-from facert.live.loop import CATCH_UP, Limits, Session
+from facert.live.loop import CATCH_UP, PATIENCE, Limits, Session
 from facert.streaming import Streamed
 
 
@@ -29,6 +30,9 @@ class Script:
     def wait(self, _):
         return self._turns.pop(0)
 
+    def rehearse(self):
+        pass
+
     def close(self):
         pass
 
@@ -42,36 +46,45 @@ class Kept:
     def send(self, frame, pose):
         self.sent.append((frame.time, float(pose.params[0])))
 
+    def rehearse(self, frame, pose):
+        pass
+
     def close(self):
         pass
 
 
 def doubled(frame):
-    return Streamed(2.0 * frame.values, None, frame.values)
+    return Streamed(2.0 * frame.values, lambda: (None, frame.values))
 
 
-def run(script, mapping=doubled, limits=Limits(), **watched):  # noqa: B008
-    kept = Kept()
-    session = Session(script, mapping, [kept])
-    session.run(limits, **watched)
-    return session, [pose for _, pose in kept.sent]
+@pytest.fixture
+def run(plain):
+    """Runs a session; the session, and what it sent."""
+
+    def running(script, mapping=doubled, limits=Limits(), **watched):  # noqa: B008
+        kept = Kept()
+        session = Session(script, plain(mapping), [kept])
+        session.run(limits, **watched)
+        return session, [pose for _, pose in kept.sent]
+
+    return running
 
 
-def test_every_frame_is_mapped_and_sent_with_its_time():
+def test_every_frame_is_mapped_and_sent_with_its_time(plain):
     kept, script = Kept(), Script([0], [1], [2])
-    Session(script, doubled, [kept], [kept]).run(Limits())
+    Session(script, plain(doubled), [kept], [kept]).run(Limits())
     assert kept.sent == [(n / 60, 2.0 * n) for n in (0, 0, 1, 1, 2, 2)]
     assert script.counters.mapped == 3
 
 
-def test_frames_that_waited_a_moment_are_all_mapped(monkeypatch):
+def test_frames_that_waited_a_moment_are_all_mapped(monkeypatch, run):
     monkeypatch.setattr("facert.live.loop.CATCH_UP", 10.0)
     session, sent = run(Script([0], [1, 2, 3, 4]))
     assert sent == [0.0, 2.0, 4.0, 6.0, 8.0]
     assert session.counters.dropped == 0
 
 
-def test_when_mapping_is_too_slow_the_newest_frame_wins():
+def test_when_mapping_is_too_slow_the_newest_frame_wins(run):
     def slow(frame):
         time.sleep(2 * CATCH_UP)
         return doubled(frame)
@@ -82,7 +95,7 @@ def test_when_mapping_is_too_slow_the_newest_frame_wins():
     assert session.counters.mapped + session.counters.dropped == session.counters.received
 
 
-def test_a_frame_without_a_pose_is_counted_and_the_show_goes_on(caplog):
+def test_a_frame_without_a_pose_is_counted_and_the_show_goes_on(caplog, run):
     def odd(frame):
         if frame.values[0] % 2:
             raise NumericalError("no finite pose")
@@ -94,12 +107,12 @@ def test_a_frame_without_a_pose_is_counted_and_the_show_goes_on(caplog):
     assert caplog.text.count("no finite pose") == 1
 
 
-def test_it_ends_after_so_many_frames():
+def test_it_ends_after_so_many_frames(run):
     session, sent = run(Script([0], [1, 2, 3], [4]), limits=Limits(frames=2))
     assert len(sent) == session.counters.mapped == 2
 
 
-def test_it_ends_after_so_many_seconds():
+def test_it_ends_after_so_many_seconds(run):
     class Silent(Script):
         finished = False
 
@@ -112,7 +125,7 @@ def test_it_ends_after_so_many_seconds():
     assert time.monotonic() - began >= 0.05
 
 
-def test_it_ends_when_somebody_wants_it_to():
+def test_it_ends_when_somebody_wants_it_to(run):
     calls = []
     _, sent = run(
         Script([0], [1], [2]), stopped=lambda: len(calls) == 2, between=lambda: calls.append(1)
@@ -120,7 +133,7 @@ def test_it_ends_when_somebody_wants_it_to():
     assert sent == [0.0, 2.0]
 
 
-def test_latency_is_measured_from_arrival_until_all_is_sent():
+def test_latency_is_measured_from_arrival_until_all_is_sent(run):
     def slow(frame):
         time.sleep(0.02)
         return doubled(frame)
@@ -130,7 +143,7 @@ def test_latency_is_measured_from_arrival_until_all_is_sent():
     assert 20.0 <= pace.median <= pace.p99 <= pace.worst
 
 
-def test_without_frames_there_is_no_pace():
+def test_without_frames_there_is_no_pace(run):
     session, _ = run(Script([]))
     assert np.isnan(session.meter.pace().median)
 
@@ -140,3 +153,52 @@ def test_limits_that_are_not_given_never_come(frames, seconds):
     limits = Limits.of(frames, seconds)
     assert limits.frames == (frames or np.inf)
     assert limits.seconds == (seconds or np.inf)
+
+
+class Waiting(Script):
+    """Brings what it was given, with nothing in between as often as there is patience for."""
+
+    def __init__(self, *turns):
+        super().__init__(*turns)
+        self.waits = []
+
+    def wait(self, seconds):
+        self.waits.append(seconds)
+        time.sleep(min(seconds, 0.001))
+        found = self._turns.pop(0)
+        return [replace(frame, arrived=time.perf_counter()) for frame in found]
+
+
+def test_between_frames_it_prepares_and_rehearses_the_last_one(plain):
+    kept, mapper, script = Kept(), plain(doubled), Waiting([0], [], [1], [], [], [2, 3])
+    Session(script, mapper, [kept]).run(Limits())
+    assert mapper.prepared == 3
+    assert mapper.rehearsed == [0.0, 1 / 60, 1 / 60]
+    assert kept.sent == [(n / 60, 2.0 * n) for n in range(4)]
+    assert script.counters.mapped == 4
+
+
+def test_nothing_is_rehearsed_before_there_was_a_pose(plain):
+    def none(_):
+        raise NumericalError("no finite pose")
+
+    mapper = plain(none)
+    Session(Waiting([], [0], []), mapper, [Kept()]).run(Limits())
+    assert not mapper.rehearsed
+
+
+def test_a_rehearsal_that_fails_changes_nothing(plain):
+    class Shy(plain):
+        def rehearse(self, _):
+            raise NumericalError("not now")
+
+    script = Waiting([0], [], [1])
+    Session(script, Shy(doubled), [Kept()]).run(Limits())
+    assert (script.counters.mapped, script.counters.failed) == (2, 0)
+
+
+def test_it_waits_for_long_only_while_no_frames_come(plain):
+    script = Waiting([], [0], [], [1])
+    Session(script, plain(doubled), [Kept()]).run(Limits())
+    assert script.waits[:2] == [PATIENCE] * 2
+    assert max(script.waits[2:]) < PATIENCE

@@ -25,6 +25,16 @@ def test_frames_come_in_order_with_their_values_and_times(receiver, phone, colle
     assert receiver.counters.received == 5
 
 
+def test_understanding_a_packet_once_more_changes_nothing(receiver, phone, collect):
+    receiver.rehearse()  # there was none
+    for number in range(4):
+        phone.send(phone.packet(number, value=number / 10))
+        (frame,) = collect(1)
+        receiver.rehearse(), receiver.rehearse()
+        np.testing.assert_allclose(frame.values, number / 10, atol=1e-7)
+    assert (receiver.counters.received, receiver.counters.late) == (4, 0)
+
+
 def test_malformed_truncated_and_repeated_packets_change_nothing_but_a_counter(
     receiver, phone, collect
 ):

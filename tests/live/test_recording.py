@@ -32,7 +32,7 @@ def recordings():
 
 
 def pose(frame, std=None):
-    return Streamed(frame.values.ravel()[:2], std, 2.0 * frame.values[:2])
+    return Streamed(frame.values.ravel()[:2], lambda: (std, 2.0 * frame.values[:2]))
 
 
 def test_what_comes_in_is_written_as_a_take_that_begins_at_0(recordings, tmp_path):
@@ -86,6 +86,18 @@ def test_a_file_that_exists_is_refused_before_the_show(recordings, tmp_path):
         recordings().source(tmp_path / "in.h5")
     recordings(overwrite=True).source(tmp_path / "in.h5")
     assert (tmp_path / "in.h5").read_text() == "precious"
+
+
+def test_a_file_that_appears_during_the_show_is_left_alone(recordings, tmp_path, caplog):
+    files = recordings()
+    record = files.source(tmp_path / "in.livelink.h5")
+    record.add(WEIGHTS[0])
+    for name in ("in.livelink.h5", "in-2.livelink.h5"):
+        (tmp_path / name).write_text("precious")
+    assert files.write("") == [tmp_path / "in-3.livelink.h5"]
+    assert len(facert.read_take(tmp_path / "in-3.livelink.h5")) == 1
+    assert (tmp_path / "in.livelink.h5").read_text() == "precious"
+    assert "in.livelink.h5 appeared meanwhile: written to" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["in.txt", "in.livelink.csv"])

@@ -22,7 +22,9 @@ def send(port, *poses, names=("jaw", "brow")):
     sender = open_sender(Address("osc", "127.0.0.1", port), names, counters)
     for number, params in enumerate(poses):
         values = np.asarray(params, dtype=float)
-        sender.send(Frame(number / 60, values, 0.0), Streamed(values, None, values))
+        pose = Streamed(values, lambda: (None, np.zeros(0)))
+        sender.rehearse(Frame(number / 60, -values, 0.0), pose)
+        sender.send(Frame(number / 60, values, 0.0), pose)
     sender.close()
     return counters
 

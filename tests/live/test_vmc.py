@@ -1,3 +1,6 @@
+import math
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,8 +9,9 @@ from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from facert.live.frames import BadPacketError
+from facert.live.frames import BadPacketError, Observed
 from facert.live.osc import message, parse
+from facert.live.osc_layout import MOST_ALIKE, MOST_LENGTHS, Layouts
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 NAMES = ("jawOpen", "mouthSmileLeft", "Brow Up")
@@ -120,3 +124,75 @@ def test_random_bytes_between_good_packets_change_nothing(noise):
             continue
     observed = decoder.decode(message("/any/frame"))
     np.testing.assert_array_equal(observed.values, [0.5, np.nan, np.nan])
+
+
+NUMBER = st.floats(-2.0, 2.0, width=32)
+ONE = st.one_of(
+    st.tuples(st.just("/VMC/Ext/Blend/Val"), st.sampled_from([*NAMES, "unknown"]), NUMBER),
+    st.tuples(st.sampled_from(["/VMC/Ext/T", "/facert/jawOpen", "/facert/Brow_Up"]), NUMBER),
+    st.tuples(st.sampled_from(["/facert/jawOpen", "/VMC/Ext/Bone/Pos"]), NUMBER, NUMBER, NUMBER),
+    st.tuples(st.sampled_from(["/VMC/Ext/OK", "/VMC/Ext/T"]), st.integers(0, 3)),
+    st.tuples(st.just("/VMC/Ext/T")),
+    st.tuples(st.just("/facert/frame"), NUMBER),
+    st.tuples(st.just("/VMC/Ext/Blend/Apply")),
+)
+LONG = message("/padding/that/makes/a/datagram/long/enough/to/be/remembered", *["text"] * 40)
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    shapes=st.lists(st.lists(ONE, max_size=5), min_size=1, max_size=3),
+    order=st.lists(st.tuples(st.integers(0, 2), st.integers(-2, 2)), max_size=12),
+    bad=st.sampled_from([1.0, math.inf, math.nan]),
+    kind=st.sampled_from(["weights", "markers"]),
+)
+def test_datagrams_that_came_before_are_understood_as_at_first(shapes, order, bad, kind):
+    """Whatever their numbers are now; the other decoder has never seen any of them."""
+    decoder, forgetful = OscDecoder(NAMES, kind), OscDecoder(NAMES, kind)
+    for which, shift in order:
+        messages = [LONG]
+        for address, *arguments in shapes[which % len(shapes)]:
+            moved = [bad * (a + shift) if isinstance(a, float) else a for a in arguments]
+            messages.append(message(address, *moved))
+        packet = bundle(*messages)
+        forgetful._layouts = Layouts()
+        results = []
+        for one in (decoder, forgetful):
+            try:
+                results.append(one.decode(packet))
+            except BadPacketError:
+                results.append("bad")
+        assert type(results[0]) is type(results[1])
+        if isinstance(results[0], Observed):
+            np.testing.assert_array_equal(results[0].values, results[1].values)
+            assert results[0].stamp == results[1].stamp
+            assert results[0].identity == results[1].identity
+
+
+def test_a_rehearsal_leaves_a_frame_in_parts_as_it_is():
+    decoder, packets = weights(CONTROLS), VmcEncoder(CONTROLS).encode(POSE, 1.0)
+    feed(decoder, *packets)
+    decoder.decode(packets[0])
+    decoder.rehearse(packets[-1])
+    assert np.isnan(feed(decoder, message("/VMC/Ext/Blend/Apply")).values).any()
+
+
+def bundle(*messages):
+    elements = [struct.pack(">i", len(raw)) + raw for raw in messages]
+    return b"#bundle\0" + struct.pack(">Q", 1) + b"".join(elements)
+
+
+def test_a_performers_datagrams_are_remembered_and_a_flood_of_others_is_not():
+    decoder, encoder = weights(CONTROLS), VmcEncoder(CONTROLS)
+    for time in range(3):
+        packets = encoder.encode(POSE + time, float(time))
+        observed = feed(decoder, *packets)
+        np.testing.assert_allclose(observed.values, POSE + time, atol=1e-6)
+        assert observed.stamp == time
+    known = decoder._layouts._known
+    assert sum(map(len, known.values())) == len(packets)
+    for number in range(200):
+        decoder.decode(bundle(LONG, message("/x" * (number + 1), float(number))))
+        decoder.decode(bundle(LONG, message(f"/flood{number:03}", float(number))))
+    assert len(known) == MOST_LENGTHS
+    assert max(map(len, known.values())) == MOST_ALIKE

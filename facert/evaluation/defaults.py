@@ -1,0 +1,63 @@
+"""How many labels and how much unlabelled data a take can be evaluated with, if nobody says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facert.errors import InputError
+from facert.evaluation.protocol import Problem, pools
+from facert.training_set import MIN_LABELS
+
+LABELS = (10, 20, 30, 40)
+UNLABELLED = 100
+LEAST_TESTED = 10
+"""Frames that are tested at least where all of `LABELS` are tried."""
+
+
+def default_unlabelled(problem: Problem) -> int:
+    """Unlabelled frames, and as many poses where these are drawn from the posed frames too.
+
+    No more than half of the posed frames go there.
+    """
+    posed, unposed = _frames(problem)
+    if problem.poses_are_frames:
+        return min(UNLABELLED, posed // 4)
+    return min(UNLABELLED, unposed + posed // 2 if problem.take.animation is not None else unposed)
+
+
+def default_labels(problem: Problem, unlabelled: int) -> tuple[int, ...]:
+    """10 to 40 labels; of a take with few posed frames a quarter, a half and three quarters.
+
+    Parameters
+    ----------
+    problem : Problem
+    unlabelled : int
+        The most unlabelled frames that are asked for.
+
+    Raises
+    ------
+    InputError
+        When too few frames are posed to learn from some and to test on others.
+    """
+    posed, unposed = _frames(problem)
+    left = posed - max(0, unlabelled - unposed)
+    if problem.poses_are_frames:
+        left -= unlabelled  # unlabelled poses come from posed frames alone
+    tested = 0 if problem.across else 1
+    if left < MIN_LABELS + tested:
+        raise InputError(
+            "/target/params",
+            f"{MIN_LABELS + tested} posed frames at least, to learn from some and test on others",
+            f"{posed}, of which {max(left, 0)} are left for that",
+            "Pose 10 to 40 frames, those that facert suggest names, or give --unlabelled 0.",
+        )
+    if left >= LABELS[-1] + LEAST_TESTED:
+        return LABELS
+    return tuple(sorted({max(MIN_LABELS, left * quarters // 4) for quarters in (1, 2, 3)}))
+
+
+def _frames(problem: Problem) -> tuple[int, int]:
+    """How many posed frames there are to draw from in every repeat, and how many others."""
+    parts = [pools(problem, repeat)[0] for repeat in range(2)]  # the halves of a split by blocks
+    posed = [int(np.isin(part, problem.take.labels).sum()) for part in parts]
+    return min(posed), min(len(part) - count for part, count in zip(parts, posed, strict=True))

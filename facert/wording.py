@@ -1,0 +1,12 @@
+"""Words of messages."""
+
+from __future__ import annotations
+
+
+def plural(count: int, noun: str, nouns: str = "") -> str:
+    """A number with its noun.
+
+    >>> plural(1, "frame"), plural(0, "frame"), plural(3, "vertex", "vertices")
+    ('1 frame', '0 frames', '3 vertices')
+    """
+    return f"{count} {noun if count == 1 else nouns or noun + 's'}"

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from facert.cleaning.estimate import estimate
+from facert.remembering import remembered
+
+
+@pytest.fixture
+def counted():
+    calls = []
+
+    @remembered
+    def total(values, scale=1.0):
+        calls.append(values)
+        return scale * values.sum()
+
+    return total, calls
+
+
+def test_the_same_contents_are_worked_out_once(counted):
+    total, calls = counted
+    assert total(np.arange(3.0)) == total(np.arange(3.0)) == 3.0
+    assert len(calls) == 1
+
+
+def test_other_contents_are_worked_out_anew(counted):
+    total, calls = counted
+    values = np.arange(3.0)
+    assert total(values) == 3.0
+    values[0] = 5.0  # the same array, changed in place
+    assert total(values) == 8.0
+    assert total(values, scale=2.0) == 16.0
+    assert len(calls) == 3
+
+
+def test_an_error_is_not_remembered():
+    failing = iter([True, False])
+
+    @remembered
+    def sometimes(x):
+        if next(failing):
+            raise ValueError
+        return x
+
+    with pytest.raises(ValueError):
+        sometimes(1)
+    assert sometimes(1) == 1
+
+
+def test_a_take_is_cleaned_once_for_training_and_retargeting(make_take):
+    take = make_take()
+    again = take.source.matrix.copy()
+    first = estimate(take.source.matrix, take.time)
+    assert estimate(again, take.time.copy()) is first
+    assert estimate(again, take.time, 0.1) is not first
