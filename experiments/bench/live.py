@@ -16,6 +16,7 @@ import os
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -34,11 +35,12 @@ from experiments.bench.problem import bench_take
 from facert import Settings, train
 from facert.data import FloatArray, Source, Take
 from facert.live.livelink import PACKET_NAMES, LiveLinkEncoder
-from facert.live.osc import parse
 
 WARM = 2.0
 """Seconds at the beginning that memory is not counted of."""
 PATIENCE = 5.0
+CLOCK, APPLY = b"/VMC/Ext/T\0\0,f\0\0", b"/VMC/Ext/Blend/Apply"
+"""Of VMC: what stands before the second of a pose, and in the last packet of one."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,11 @@ class Session:
     process: subprocess.Popen[str]
     port: int
 
-    def memory(self) -> float:
-        """Resident MiB."""
+    def memory(self) -> float | None:
+        """Resident MiB; None of a process that has ended."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
+        found = re.search(r"VmRSS:\s+(\d+)", status)
+        return None if found is None else int(found[1]) / 1024
 
 
 def phone_take() -> Take:
@@ -98,19 +101,24 @@ def session(model: Path, to: int, options: list[str]) -> Iterator[Session]:
 
 
 def listen(engine: socket.socket, rate: float, count: int) -> FloatArray:
-    """When each frame's pose had arrived, (count,); NaN if it never did."""
-    arrived, clock = np.full(count, np.nan), 0.0
+    """When each frame's pose had arrived, (count,); NaN if it never did.
+
+    An engine takes microseconds to understand a packet. What would take Python longer runs on the
+    sender's core, and would count as its latency: packets are only searched.
+    """
+    arrived, clock, missing = np.full(count, np.nan), 0.0, count
     engine.settimeout(PATIENCE)
-    while np.isnan(arrived).any():
+    while missing:
         try:
             packet = engine.recv(2**16)
         except TimeoutError:
             break
-        for one in parse(packet):
-            if one.address == "/VMC/Ext/T":
-                clock = one.numbers[0]
-            elif one.address == "/VMC/Ext/Blend/Apply" and round(clock * rate) < count:
-                arrived[round(clock * rate)] = time.monotonic()
+        place = packet.find(CLOCK)
+        if place >= 0:
+            (clock,) = struct.unpack_from(">f", packet, place + len(CLOCK))
+        if APPLY in packet and round(clock * rate) < count:
+            arrived[round(clock * rate)] = time.monotonic()
+            missing -= 1
     return arrived
 
 
@@ -126,8 +134,8 @@ class Memory(threading.Thread):
         """Look once a second, from `WARM` on until the process ends."""
         time.sleep(WARM)
         with suppress(OSError):
-            while True:
-                self.found.append(self._running.memory())
+            while (held := self._running.memory()) is not None:
+                self.found.append(held)
                 time.sleep(1.0)
 
 
