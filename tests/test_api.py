@@ -37,7 +37,7 @@ sys.argv = ["facert", "--help"]
 try:
     main()
 except SystemExit as stop:
-    print("exit", stop.code, sorted({"torch", "scipy", "h5py", "matplotlib"} & set(sys.modules)))
+    print("exit", stop.code, sorted({"torch", "numpy", "scipy", "h5py", "matplotlib"} & set(sys.modules)))
 """
     assert run(code).endswith("exit 0 []\n")
 

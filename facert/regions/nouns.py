@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from facert.errors import InputError
-from facert.names import match
 
 AUTO = "auto"
 MOST = 6
@@ -168,4 +167,6 @@ def _names(value: Any, field: str) -> tuple[str, ...]:
 
 
 def _spelled(wanted: Sequence[str], among: Sequence[str], field: str) -> tuple[str, ...]:
+    from facert.names import match  # brings NumPy, which the settings and `--help` can do without
+
     return tuple(among[index] for index in match(wanted, among, field))
