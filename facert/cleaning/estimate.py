@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from facert.cleaning.calibration import error_of_filling
 from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
-from facert.data import FloatArray, IntArray
+from facert.data import BoolArray, FloatArray, IntArray
 from facert.normalisation import STILL, Normalisation
 from facert.remembering import remembered
 from facert.threads import threads_for
@@ -35,21 +37,38 @@ class Estimate:
 
     Parameters
     ----------
-    frames, std : array, shape (T, d)
-        Mean and standard deviation; NaN in columns that were never observed.
+    frames, spread : array, shape (T, d)
+        Mean and standard deviation by the model of the motion; NaN in columns that were never
+        observed.
+    hidden : array of bool, shape (T, d)
+        What was not observed.
     sigma : float
         Standard deviation of the capture noise.
     motion : Motion
         How the observed columns move, in `units`.
     units : Normalisation
         Of the observed columns.
+    given : array, shape (T', d')
+        The observed columns in these units, evenly spaced in time, that the estimate is of.
     """
 
     frames: FloatArray
-    std: FloatArray
+    spread: FloatArray
+    hidden: BoolArray
     sigma: float
     motion: Motion
     units: Normalisation
+    given: FloatArray
+
+    @cached_property
+    def std(self) -> FloatArray:
+        """Standard deviation, (T, d); of what was hidden, as the take's gaps tell that it is."""
+        if not self.hidden.any():
+            return self.spread
+        noise = max(self.sigma / self.units.scale, LEAST_NOISE)
+        with threads_for(1):
+            ratio = error_of_filling(self.given, noise, float(self.motion.clock[0]))
+        return np.where(self.hidden, ratio * self.spread, self.spread)
 
     def told(self, unit: str) -> str:
         """What was estimated, for people."""
@@ -81,20 +100,20 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Est
         When nothing moves.
     """
     places, step = grid(time)
-    spread = np.full((places[-1] + 1, X.shape[1]), np.nan)
-    spread[places] = X
-    sigma = capture_noise(spread) if sigma is None else sigma
+    even = np.full((places[-1] + 1, X.shape[1]), np.nan)
+    even[places] = X
+    sigma = capture_noise(even) if sigma is None else sigma
     ever = ~np.isnan(X).all(axis=0)
     units = Normalisation.of(X[:, ever], "/source")
     noise = max(sigma / units.scale, LEAST_NOISE)
-    normalised = units.apply(spread[:, ever])
+    given = units.apply(even[:, ever])
     with threads_for(1):
-        motion = Motion.learned(normalised, noise, step)
-        mean, variance = motion.smooth(normalised, noise)
-    frames, std = np.full(X.shape, np.nan), np.full(X.shape, np.nan)
+        motion = Motion.learned(given, noise, step)
+        mean, variance = motion.smooth(given, noise)
+    frames, spread = np.full(X.shape, np.nan), np.full(X.shape, np.nan)
     frames[:, ever] = units.undo(mean[places])
-    std[:, ever] = units.scale * np.sqrt(variance[places])
-    return Estimate(frames, std, sigma, motion, units)
+    spread[:, ever] = units.scale * np.sqrt(variance[places])
+    return Estimate(frames, spread, np.isnan(X), sigma, motion, units, given)
 
 
 def estimate_if_it_moves(
