@@ -94,6 +94,8 @@ class Source:
                 "NaN or invalid everywhere",
                 "Check the export.",
             )
+        if self.std is not None:
+            frozen(self.std)
         set_fields(self, values=frozen(values), names=names)
 
     @property

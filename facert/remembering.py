@@ -17,8 +17,8 @@ Result = TypeVar("Result")
 def remembered(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """The function with a memory of its last call.
 
-    Called with equal arguments, contents of arrays included, it returns the same result, which
-    nobody may change.
+    Called with equal arguments, contents of arrays included, it returns the same result: its arrays
+    should not be writeable.
     """
     last: tuple[str, Result] | None = None
 

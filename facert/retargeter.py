@@ -121,10 +121,11 @@ class Retargeter:
                 "the model does not know the actor at rest and takes the smallest pose for it: "
                 "name such frames in training as well"
             )
+        there = replace(self, method=self.method.on(device))
         try:
             if mode == "online":
                 return self._one_by_one(take, handling)
-            return replace(self, method=self.method.on(device))._together(take, handling)
+            return there._together(take, handling)
         except (np.linalg.LinAlgError, OverflowError):
             raise NumericalError("the model's numbers are too large or small to map with") from None
 

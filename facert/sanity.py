@@ -32,10 +32,8 @@ def check_poses(take: Take) -> None:
         When all of them are foretold: a result of retargeting was taken for what it was learned
         from. Of some the log warns.
     """
-    if take.std is None or not len(take.labels):
-        return
-    foretold = int((take.std[take.labels] > 0).any(axis=1).sum())
-    if foretold == len(take.labels):
+    foretold = foretold_poses(take)
+    if foretold and foretold == len(take.labels):
         raise InputError(
             "/target/std",
             "poses that somebody set",
@@ -46,6 +44,11 @@ def check_poses(take: Take) -> None:
     if foretold:
         poses = plural(foretold, "pose")
         log.warning("%s with a standard deviation: foretold, and learned from as labels", poses)
+
+
+def foretold_poses(take: Take) -> int:
+    """How many of the posed frames have a standard deviation: a model foretold them."""
+    return 0 if take.std is None else int((take.std[take.labels] > 0).any(axis=1).sum())
 
 
 def warn_if_constant(method: Method, frames: FloatArray, labels: FloatArray) -> None:

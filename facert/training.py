@@ -21,7 +21,6 @@ from facert.posing.known import keep
 from facert.preparation import Prepared, prepare
 from facert.ranges import parse_frames
 from facert.regions.layout import FaceData, method_for
-from facert.regions.nouns import Regions
 from facert.regions.resolution import resolved
 from facert.retargeter import Retargeter
 from facert.sanity import check_poses, warn_if_constant
@@ -53,13 +52,12 @@ def train(
     start : Retargeter, optional
         What a shared model begins at, as after a label was added to the take that it was trained
         on: frames and poses that it knows keep their latent coordinates, and a few iterations
-        do. The other methods learn in one go, and begin anew.
+        do. One of another form is told and not used; other methods learn in one go anyway.
 
     Raises
     ------
     InputError
-        When the take has too few labels, or source or poses that never change; or when `start` is
-        of other settings, or another character.
+        When the take has too few labels, or source or poses that never change.
     """
     if settings is None:
         settings = Settings() if start is None else replace(start.settings, labels=None)
@@ -89,21 +87,23 @@ def train(
     )
     face = FaceData(prepared.measured, controls, poses, data.X_labelled, complete)
     method = method_for(settings, given, face)
-    layout = SourceLayout(take.source.kind, take.source.names)
-    if start is not None:
-        _require_same_kind(start, settings, layout, controls)
-        method.begin_at(
-            start.method,
-            source_units.seen_from(start.source_units),
-            target_units.seen_from(start.target_units),
-        )
+    if start is not None and method_class(settings.method).stepwise:
+        other = _differs(start, settings, take, controls)
+        if other is None:
+            method.begin_at(
+                start.method,
+                source_units.seen_from(start.source_units),
+                target_units.seen_from(start.target_units),
+            )
+        else:
+            log.warning("training begins anew: the start has another %s", other)
     began = time.perf_counter()
     report = method.fit(labelled, unlabelled, monitor or Monitor())
     seconds = time.perf_counter() - began
     warn_if_constant(method, np.vstack([labelled.X, unlabelled.X]), labelled.Y)
     return Retargeter(
         method=method,
-        layout=layout,
+        layout=SourceLayout(take.source.kind, take.source.names),
         units=take.units,
         controls=controls,
         bounds=bounds,
@@ -117,35 +117,18 @@ def train(
     )
 
 
-def _require_same_kind(
-    start: Retargeter, settings: Settings, layout: SourceLayout, controls: Controls
-) -> None:
-    """A model can begin at another one of the same form.
-
-    Raises
-    ------
-    InputError
-        When it has another one.
-    """
-    regions = [
-        s.regions.names if isinstance(s.regions, Regions) else None
-        for s in (settings, start.settings)
-    ]
+def _differs(start: Retargeter, settings: Settings, take: Take, controls: Controls) -> str | None:
+    """What keeps a model from being the start of one for this take; None if nothing does."""
     forms = {
         "method": (settings.method, start.settings.method),
         "latent_dim": (settings.latent_dim, start.settings.latent_dim),
-        "regions": (regions[0], regions[1]),
-        "source": (layout.names, start.layout.names),
+        "regions": (settings.regions, start.settings.regions),
+        "kind of source": (take.source.kind, start.layout.kind),
+        "unit of markers": (take.units, start.units),
+        "markers or weights": (take.source.names, start.layout.names),
         "controls": (controls.names, start.controls.names),
     }
-    for field, (expected, found) in forms.items():
-        if expected != found:
-            fix = "Start from a model of this take's kind, or anew."
-            raise InputError(f"the start's {field}", _brief(expected), _brief(found), fix)
-
-
-def _brief(value: object) -> str:
-    return f"{len(value)} names" if isinstance(value, tuple) else str(value)
+    return next((what for what, (here, there) in forms.items() if here != there), None)
 
 
 def _neutral(take: Take, data: TrainingSet, settings: Settings) -> FloatArray:

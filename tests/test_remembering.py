@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from facert.cleaning.detection import find_faults
 from facert.cleaning.estimate import estimate
 from facert.remembering import remembered
 
@@ -53,3 +54,11 @@ def test_a_take_is_cleaned_once_for_training_and_retargeting(make_take):
     first = estimate(take.source.matrix, take.time)
     assert estimate(again, take.time.copy()) is first
     assert estimate(again, take.time, 0.1) is not first
+
+
+def test_nobody_can_change_what_is_remembered(make_take):
+    take = make_take()
+    found, faults = estimate(take.source.matrix, take.time), find_faults(take.source)
+    for array in (found.frames, found.std, found.given, faults.zero, faults.spiked):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0

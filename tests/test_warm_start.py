@@ -110,16 +110,59 @@ def test_regions_begin_each_at_their_own(make_take):
 
 
 @pytest.mark.parametrize(
-    ("changes", "field"),
+    ("changes", "what"),
     [({"method": "sgplvm"}, "method"), ({"latent_dim": 3}, "latent_dim")],
 )
-def test_a_start_of_other_settings_is_refused(take, before, changes, field):
-    with pytest.raises(facert.InputError, match=f"the start's {field}"):
-        facert.train(take, replace(before.settings, **changes), start=before)
+def test_a_start_of_other_settings_is_not_used(take, before, changes, what, caplog):
+    settings = replace(before.settings, max_iterations=20, **changes)
+    begun = facert.train(take, settings, start=before)
+    assert f"training begins anew: the start has another {what}" in caplog.text
+    assert begun.figures["objective"] == facert.train(take, settings).figures["objective"]
 
 
-def test_a_start_of_another_character_is_refused(take, before):
-    names = tuple(f"other_{name}" for name in take.controls.names)
-    other = replace(take, controls=replace(take.controls, names=names))
-    with pytest.raises(facert.InputError, match="the start's controls"):
-        facert.train(other, start=before)
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda take: replace(take, units="mm"), "unit of markers"),
+        (
+            lambda take: replace(
+                take, source=facert.Source(take.source.values[:, ::-1], take.source.names[::-1])
+            ),
+            "markers or weights",
+        ),
+        (
+            lambda take: replace(
+                take, source=facert.Source(take.source.values[..., 0], take.source.names)
+            ),
+            "kind of source",
+        ),
+        (
+            lambda take: replace(take, controls=replace(take.controls, names=("a", "b", "c", "d"))),
+            "controls",
+        ),
+    ],
+)
+def test_a_start_of_another_actor_or_character_is_not_used(take, before, change, what, caplog):
+    facert.train(change(take), replace(before.settings, max_iterations=3), start=before)
+    assert f"training begins anew: the start has another {what}" in caplog.text
+
+
+def test_regions_of_other_members_begin_anew(make_take, caplog):
+    take = make_take(frames=40, posed=8)
+    names, controls = take.source.names, take.controls.names
+
+    def split(at):
+        parts = (Region("a", names[:at], controls[:2]), Region("b", names[at:], controls[2:]))
+        return replace(SHARED, latent_dim=2, max_iterations=3, regions=Regions(parts))
+
+    first = facert.train(take, split(2))
+    facert.train(take, split(3), start=first)
+    assert "the start has another regions" in caplog.text
+
+
+def test_more_labels_bring_the_latent_dimensions_that_few_could_not_carry(take):
+    few = facert.train(with_labels(take, 4), replace(SHARED, method="sgplvm"))
+    more = facert.train(take, start=few)
+    assert few.method.source_.Z.shape[1] == 3
+    assert more.method.source_.Z.shape[1] == 4
+    assert more.figures["objective"] == facert.train(take, more.settings).figures["objective"]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from facert.arrays import frozen
 from facert.cleaning.interpolation import interpolated
 from facert.data import BoolArray, FloatArray, IntArray, Source, Take
 from facert.gaps import Gaussian
@@ -56,6 +57,10 @@ class Faults:
     frozen: BoolArray
     swapped: BoolArray
     spiked: BoolArray
+
+    def __post_init__(self) -> None:
+        for kind in fields(self):
+            frozen(getattr(self, kind.name))  # remembered: what one caller changed would stay
 
     @property
     def any(self) -> BoolArray:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from facert.arrays import frozen
 from facert.cleaning.calibration import error_of_filling
 from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
@@ -60,6 +61,10 @@ class Estimate:
     units: Normalisation
     given: FloatArray
 
+    def __post_init__(self) -> None:
+        for array in (self.frames, self.spread, self.hidden, self.given):
+            frozen(array)  # it is remembered: what one caller changed would come to all
+
     @cached_property
     def std(self) -> FloatArray:
         """Standard deviation, (T, d); of what was hidden, as the take's gaps tell that it is."""
@@ -68,7 +73,7 @@ class Estimate:
         noise = max(self.sigma / self.units.scale, LEAST_NOISE)
         with threads_for(1):
             ratio = error_of_filling(self.given, noise, float(self.motion.clock[0]))
-        return np.where(self.hidden, ratio * self.spread, self.spread)
+        return frozen(np.where(self.hidden, ratio * self.spread, self.spread))
 
     def told(self, unit: str) -> str:
         """What was estimated, for people."""

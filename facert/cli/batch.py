@@ -69,6 +69,8 @@ def plan(
     """
     if out_dir is None:
         return _single(paths, ending, jobs, overwrite, endings)
+    if ending is not None and not ending.startswith("."):
+        raise typer.BadParameter(f"write --ending with its dot: .{ending}")
     sources = [file for path in paths for file in _files(path)]
     outputs = [out_dir / (_stem(source) + (ending or ".h5")) for source in sources]
     _require_ending(outputs[0], endings)
@@ -108,10 +110,10 @@ def _single(
 
 def _require_ending(output: Path, endings: tuple[str, ...]) -> None:
     """Refuse a result that cannot be written, before any work is done."""
-    from facert.io.formats import TAKE_OUTPUTS, unknown_output
+    from facert.io.formats import TAKE_OUTPUTS, ends_in, unknown_output
 
     known = endings or TAKE_OUTPUTS
-    if not output.name.lower().endswith(known):
+    if not ends_in(output, known):
         raise unknown_output(output, ", ".join(known))
 
 

@@ -118,12 +118,16 @@ def _motion(take: Take, wanted: Wanted, changes: Changes) -> _Motion:
     if wanted.rig is None:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
     with reading(wanted.rig):
-        rig = in_space(formats.read_rig_file(wanted.rig, wanted.shapes), changes)
-    assert isinstance(rig, Rig)  # as it went in
+        rig = formats.read_rig_file(wanted.rig, wanted.shapes)
+        # What IN holds, `--in-units`, says nothing of a rig that knows its own unit; and the axis
+        # that is up is the rig's own.
+        stated = rig.units or changes.in_units
+        in_unit = in_space(rig, Changes(in_units=stated, units=changes.units))
+    assert isinstance(in_unit, Rig)  # as it went in
     if not len(take.labels) and take.source.kind == "weights":
-        take = weights_as_poses(take, rig)
-    settings = control_settings(take, rig, range(len(take)))
-    return _Motion(rig_morphs(rig, settings, take.time), take.fps)
+        take = weights_as_poses(take, in_unit)
+    settings = control_settings(take, in_unit, range(len(take)))
+    return _Motion(rig_morphs(in_unit, settings, take.time), take.fps)
 
 
 def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:

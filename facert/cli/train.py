@@ -148,7 +148,10 @@ def command(
     stepwise = method_class(settings.method).stepwise and settings.regions is None
     _warn_of_idle_settings(settings)
     if not stepwise:
-        _warn_of_idle_options(settings, {"--resume": resume, "--log": curve, "--start": start})
+        idle: dict[str, object] = {"--resume": resume, "--log": curve}
+        if not method_class(settings.method).stepwise:
+            idle["--start"] = start
+        _warn_of_idle_options(settings, idle)
     checkpoint = CheckpointFile(checkpoint_path(output), resume) if stepwise else None
     # An interrupted run leaves a model, and a checkpoint to continue from.
     continues = checkpoint is not None and checkpoint.continues

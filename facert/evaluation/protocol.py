@@ -17,7 +17,9 @@ from facert.errors import InputError, reading
 from facert.metrics import vertex_gram
 from facert.names import match
 from facert.normalisation import Normalisation
+from facert.sanity import foretold_poses
 from facert.training_set import MIN_OBSERVED
+from facert.wording import plural
 
 Split = Literal["random", "block"]
 
@@ -299,6 +301,10 @@ def _check_posed(take: Take) -> None:
         raise InputError(
             "/target/params", "known poses", "none", "Evaluate on a take with the true poses."
         )
+    foretold = foretold_poses(take)
+    if foretold:
+        found = f"{plural(foretold, 'pose')} that a model foretold"
+        raise InputError("/target/std", "true poses", found, "Give the take that was posed.")
 
 
 def _too_short(labels: int, unlabelled: int, problem: Problem, posed: int) -> InputError:

@@ -87,6 +87,11 @@ class Start:
         return cls(source, target, *same)
 
     @property
+    def latent_dim(self) -> int:
+        """Q."""
+        return int(self.source.Z.shape[1])
+
+    @property
     def kernels(self) -> tuple[Kernel, Kernel]:
         """Of the source and of the target, in the units of the other model."""
         return (

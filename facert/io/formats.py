@@ -182,6 +182,11 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
         write_curves(take, path, overwrite)
 
 
+def ends_in(path: Path, endings: tuple[str, ...]) -> bool:
+    """Whether a file's name has one of the endings, and something before it."""
+    return bool(path.suffix) and path.name.lower().endswith(endings)
+
+
 def require_take_output(path: Path, overwrite: bool) -> None:
     """Refuse a name that no take can be written to, before any work is done.
 
@@ -192,7 +197,7 @@ def require_take_output(path: Path, overwrite: bool) -> None:
     OutputExistsError
         When `path` exists and `overwrite` is not set.
     """
-    if not path.name.lower().endswith(TAKE_OUTPUTS):
+    if not ends_in(path, TAKE_OUTPUTS):
         raise unknown_output(path, ", ".join(TAKE_OUTPUTS))
     if path.exists() and not overwrite:
         raise OutputExistsError(path)

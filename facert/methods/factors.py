@@ -16,12 +16,16 @@ from typing import ClassVar
 import numpy as np
 
 from facert.data import FloatArray
+from facert.errors import InputError
 from facert.factors.censoring import Limits
 from facert.factors.model import Evidence, learn_factors
+from facert.learned import DAMAGED
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import ranked_folds
 from facert.methods.regression import Map
 from facert.methods.ssgpr import Basis, FeatureProcess
+
+HUGE = 1e150  # its square is finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,11 @@ class FactorMap(Map):
     spread: FloatArray
     limits: FloatArray
     censored: FloatArray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not ((self.spread > 0.0) & (self.spread < HUGE)).all():
+            raise InputError("factors.spread", "positive numbers", "others", DAMAGED)
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Poses of frames X (T, d_x), (T, d_y), and the standard deviation of the free ones."""

@@ -182,9 +182,14 @@ class SemiSupervisedSGPLVM:
         They are those of the model to begin at. Without one, a small model begins at the alignment
         of both views, and a large one at a small one.
         """
+        latent_dim = self._latent_dim(len(X) + len(Y) - labelled)
+        begin = self._begin
+        if begin is not None and begin.latent_dim != latent_dim:
+            log.info("more data carries more latent dimensions: training begins anew")
+            begin = self._begin = None
         if likelihood == "exact":
-            return self._exact_module(X, Y, labelled, self._begin)
-        begin = self._begin or self._trained_core(X, Y, labelled)
+            return self._exact_module(X, Y, labelled, begin)
+        begin = begin or self._trained_core(X, Y, labelled)
         module = SparseSharedGPLVM(
             X,
             Y,

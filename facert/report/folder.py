@@ -153,7 +153,7 @@ def _takes(folder: Path, curves: list[Path]) -> Iterator[tuple[Path, Take]]:
         yield from ((path, take) for take in _read([path], read_performance))
     stems = {path.stem for path in _files(folder, *HDF5_ENDINGS)}
     for path in [*curves, *_files(folder, ".csv")]:
-        if path.name.split(".")[0] not in stems:
+        if path.stem.removesuffix(".livelink") not in stems:
             yield from ((path, take) for take in _read([path], read_performance))
 
 

@@ -107,7 +107,6 @@ def test_a_take_without_a_rig_is_no_glb(facert, folder: Path) -> None:
         ("", ("--in-units", "cm"), 0.02),
         ("", ("--in-units", "mm", "--units", "m"), 0.002),
         ("cm", ("--units", "mm"), 0.02),
-        ("cm", ("--in-units", "m"), 2.0),
     ],
 )
 def test_a_glb_is_as_large_as_the_face_in_metres(
@@ -128,3 +127,13 @@ def test_a_glb_of_numbers_without_a_unit_is_warned_of(facert, folder: Path) -> N
     done = facert("convert", folder / "unit.h5", folder / "out.glb")
     assert done.code == 0
     assert "--in-units cm" in done.err
+
+
+def test_what_in_holds_says_nothing_of_a_rig_that_knows_its_unit(facert, folder: Path) -> None:
+    rig, out = folder / "unit.h5", folder / "out.glb"
+    write_rig(replace(RIG, units="cm"), rig)
+    options = ("--rig", rig, "--in-units", "mm", "--in-up-axis", "z", "--up-axis", "y")
+    assert facert("convert", folder / "take.h5", out, *options).code == 0
+    assert read_gltf_mesh(out).vertices.max(axis=0) == pytest.approx(RIG.neutral.max(axis=0) / 100)
+    assert facert("convert", rig, out, "--in-units", "m", "--overwrite").code == 0
+    assert read_gltf_mesh(out).vertices.max(axis=0) == pytest.approx(RIG.neutral.max(axis=0))
