@@ -26,13 +26,13 @@ from facert.neutral import at_rest, calibrated
 from facert.normalisation import Normalisation
 from facert.settings import Settings
 from facert.source_layout import SourceLayout
-from facert.streaming import RetargetStream
+from facert.streaming import ABSURD, RetargetStream
 from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
 
 # Distances from the training take's mean, in normalised units.
-FAR, ABSURD = 5.0, 1e6
+FAR = 5.0
 Mode = Literal["offline", "online"]
 
 

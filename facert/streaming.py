@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,9 @@ from facert.source_layout import FramePicker
 if TYPE_CHECKING:
     from facert.retargeter import Retargeter
 
+
+ABSURD = 1e6
+"""Distance from the training take's mean, in normalised units, at which nothing can be computed."""
 
 Tell = Callable[[], tuple[FloatArray | None, FloatArray]]
 """Works out the standard deviation of a pose, and the cleaned source."""
@@ -100,7 +104,9 @@ class RetargetStream:
         self._cleaned_shape = (-1, 3) if markers else (-1,)
         self._picker = FramePicker(places, len(names), 3 if markers else 1)
         self._watch = MarkerWatch(len(names)) if handling.detect and markers else None
-        self._filter = _filter(retargeter, fps, handling)
+        self._new_filter = partial(_filter, retargeter, fps, handling)
+        self._filter = self._new_filter()
+        self._heard: float | None = None
         given = self._filter is None or handling.sigma is not None
         self._meter = None if given else NoiseMeter(len(retargeter.source_units.mean))
         self._unheard: FloatArray | None = None
@@ -122,6 +128,9 @@ class RetargetStream:
         """
         own, model = self._picker.pick(self._checked(rest)), self._retargeter
         self._calibration = Calibration.of(own, model.neutral, model.layout.kind)
+        self._filter = self._new_filter()  # what it knows is where the face was
+        if self._filter is not None and self._heard is not None:
+            self._filter.hear(self._heard)
 
     def prepare(self) -> None:
         """Do what need not wait for the next frame; `step` does it where nobody did."""
@@ -130,7 +139,8 @@ class RetargetStream:
         if self._meter is not None and self._unheard is not None:
             heard, self._unheard = self._meter.step(self._unheard), None
             if heard is not None:
-                self._filter.hear(max(heard, LEAST_NOISE))
+                self._heard = max(heard, LEAST_NOISE)
+                self._filter.hear(self._heard)
         self._filter.look_ahead()
 
     def step(self, values: FloatArray) -> Streamed:
@@ -152,6 +162,9 @@ class RetargetStream:
         if self._calibration is not None:
             row = self._calibration.apply(row)
         frame = self._retargeter.source_units.apply(row)
+        if (np.abs(frame) > ABSURD).any():  # never where NaN
+            expected, found = "positions near those of the training take", "others, far away"
+            raise InputError("the frame", expected, found, "Skip it; check units and origin.")
         clean, doubt = self._cleaned(frame, seen)
         said = self._smooth.step(clean[None], doubt)
         Y = said.Y

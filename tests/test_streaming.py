@@ -233,3 +233,25 @@ def test_when_another_noise_is_heard_the_source_goes_on_where_it_is(retargeter, 
     stream = retargeter.stream(truth.source.names, truth.fps)
     errors = np.array([stream.step(frame).source for frame in values]) - truth.source.values
     assert rms(errors[HEARD:]) < 1.1 * rms(errors[10:HEARD])
+
+
+def test_a_frame_that_is_absurdly_far_is_refused_and_leaves_no_trace(retargeter, truth):
+    stream, other = (retargeter.stream(truth.source.names, truth.fps) for _ in range(2))
+    for number, frame in enumerate(truth.source.values):
+        if number in (0, 5, 6):
+            with pytest.raises(InputError, match="far away"):
+                stream.step(np.full_like(frame, 1e160))
+        np.testing.assert_array_equal(stream.step(frame).params, other.step(frame).params)
+
+
+def test_calibrating_in_mid_stream_begins_the_filter_anew(retargeter, truth):
+    """Else it would take what is calibrated for a leap of the face, and refuse it."""
+    values = truth.source.values + 0.4
+    rest = truth.source.values[0] + 0.4
+    stream = retargeter.stream(truth.source.names, truth.fps)
+    for frame in values[:20]:
+        stream.step(frame)
+    stream.calibrate(rest)
+    fresh = retargeter.stream(truth.source.names, truth.fps, rest=rest)
+    for frame in values[20 : HEARD - 1]:  # then the noise is measured, in other frames
+        np.testing.assert_allclose(stream.step(frame).params, fresh.step(frame).params, atol=1e-9)

@@ -40,6 +40,8 @@ MISHEARD = 2.0
 SETTLED = 1e-4
 """Relative change of the covariance in a frame below which it is taken to have settled."""
 
+TINY = 1e-300
+
 Seen = BoolArray | None
 """Which columns (d,) were observed; None: all."""
 
@@ -259,7 +261,7 @@ class _SeriesFilter:
         fresh = 1.0 - MEMORY if seen is None else (1.0 - MEMORY) * seen
         self._found = self._found + fresh * (surprise * surprise - self._found)
         self._foretold = self._foretold + fresh * (self.foretold - self._foretold)
-        ratio = (self._found - self._noise) / (self._foretold - self._noise)
+        ratio = (self._found - self._noise) / np.maximum(self._foretold - self._noise, TINY)
         change = np.minimum(np.maximum(ratio, FALL), RISE)  # np.clip takes three times as long
         before = self._width
         widened = before * (change if seen is None else np.where(seen, change, 1.0))

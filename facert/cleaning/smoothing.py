@@ -133,7 +133,7 @@ def _forward(
 
 def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
     """Which frames (T, ...) are just like the one before, (T,)."""
-    same = (frames[1:] == frames[:-1]).reshape(len(frames) - 1, -1).all(axis=1)
+    same = (frames[1:] == frames[:-1]).all(axis=tuple(range(1, frames.ndim)))
     return np.concatenate([[False], same])
 
 

@@ -78,7 +78,7 @@ def read_livelink(path: Path) -> Take:
             time=time,
             source=Source(values, _canonical_columns(header[2:])),
             fps=rate,
-            start_timecode=_start(rows[0].cells[0].strip(), count, rate),
+            start_timecode=_start(rows[0].cells[0].strip(), int(ticks[0]), count, rate),
         )
 
 
@@ -120,6 +120,8 @@ def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
         )
     code = take.start_timecode or "00:00:00:00.000"
     start = parse_timecode(code, APP_COUNT if says_its_count(code) else max(1, round(take.fps)))
+    if start is None:  # FF beyond the rate: the app's sixtieths, written short
+        start = parse_timecode(code)
     if start is None:
         raise InputError(
             "start_timecode", "HH:MM:SS:FF.mmm", take.start_timecode, "Correct the attribute."
@@ -166,15 +168,13 @@ def _clock(rows: Sequence[Row]) -> tuple[IntArray, int]:
     return unwrap_midnight(np.array(ticks, dtype=np.int64)), count
 
 
-def _start(code: str, count: int, rate: float) -> str:
-    """The first timecode, so that whoever reads it alone can tell how it counts.
+def _start(code: str, ticks: int, count: int, rate: float) -> str:
+    """The first timecode, of these ticks, so that whoever reads it alone can tell how it counts.
 
     With thousandths that is 1/60 s, without them frames at the take's own rate.
     """
     if count == (APP_COUNT if says_its_count(code) else round(rate)):
         return code
-    ticks = parse_timecode(code, count)
-    assert ticks is not None  # every row's timecode was read
     return format_timecode(ticks)
 
 

@@ -10,6 +10,7 @@ column ``Time`` disagree, the column counts, as it does in OpenSim.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,6 +120,8 @@ def _rate(header: _Header, time: FloatArray) -> float:
     try:
         stated = float(header.facts["datarate"])
     except (KeyError, ValueError):
+        return shown
+    if not math.isfinite(stated):
         return shown
     if not (np.diff(time) > 0).all() or _agrees(stated, shown, time):
         return stated

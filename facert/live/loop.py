@@ -97,7 +97,7 @@ class Session:
                 frames = self._receiver.wait(min(PATIENCE, end - now, ready))
                 if frames:
                     self._turn(frames, limits)
-                else:
+                elif time.perf_counter() >= now + ready:  # else it was a packet without a frame
                     self._rehearse()
                 between()
 

@@ -87,6 +87,7 @@ class FrameStream:
 
     def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x); see `facert.methods.base.Method.predict`."""
+        frame = frame.copy()  # for who asks for the variance, when it may hold another one
         X = self._gaps.fill(frame)
         pose, tell = self._map(X[0])
         if tell is None:

@@ -237,3 +237,28 @@ def test_a_recording_with_lost_faces_keeps_the_rest(real_data):
     assert len(take) == 1891
     assert take.fps == 30.0
     assert np.diff(take.time).max() > 2 / 30
+
+
+def test_a_first_timecode_that_rounds_into_the_next_second_is_read(tmp_path):
+    rows = [f"00:00:09:59.9999,61,{','.join(['0.1'] * 61)}"] + [
+        f"00:00:{10 + number // 30:02d}:{number % 30:02d},61,{','.join(['0.1'] * 61)}"
+        for number in range(1, 90)
+    ]
+    header = ",".join(["Timecode", "BlendShapeCount", *ARKIT_NAMES])
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows]) + "\n")
+    take = read_livelink(tmp_path / "a.csv")
+    assert take.start_timecode == "00:00:10:00.000"
+
+
+def test_a_start_whose_frames_are_beyond_the_rate_is_in_sixtieths(make_take, tmp_path):
+    take = replace(
+        make_take(frames=3),
+        source=Source(np.zeros((3, 61)), ARKIT_NAMES),
+        controls=None,
+        params=None,
+        animation=None,
+        start_timecode="00:00:10:59",
+        units="",
+    )
+    write_livelink(take, tmp_path / "b.livelink.csv")
+    assert (tmp_path / "b.livelink.csv").read_text().splitlines()[1].startswith("00:00:10:59.000,")

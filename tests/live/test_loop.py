@@ -202,3 +202,18 @@ def test_it_waits_for_long_only_while_no_frames_come(plain):
     Session(script, plain(doubled), [Kept()]).run(Limits())
     assert script.waits[:2] == [PATIENCE] * 2
     assert max(script.waits[2:]) < PATIENCE
+
+
+def test_packets_that_complete_no_frame_do_not_make_it_rehearse(plain):
+    """However many come, it gets ready when a frame is due, and not for each of them."""
+
+    class Junk(Script):
+        rehearsed = 0
+
+        def rehearse(self):
+            self.rehearsed += 1
+
+    script = Junk([0], [1], *[[] for _ in range(500)])
+    Session(script, plain(doubled), [Kept()]).run(Limits())
+    assert script.counters.mapped == 2
+    assert script.rehearsed < 20

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from facert.cleaning.watching import MarkerWatch
 from facert.live.frames import Frame
 from facert.live.rest import RestWatch
 
@@ -44,3 +45,22 @@ def test_it_waits_for_a_frame_however_late_that_comes():
 def test_an_actor_who_moves_does_not_rest(caplog):
     watched(np.sin(np.arange(20.0))[:, None]).rest(scale=1.0)
     assert "the actor moves" in caplog.text
+
+
+def test_a_lost_marker_written_as_zero_does_not_rest_there():
+    frames = 1.0 + 0.001 * np.random.default_rng(0).normal(size=(10, 3, 3))
+    frames[:, 1] = 0.0
+    watch = RestWatch(1.0, MarkerWatch(3))
+    for number, row in enumerate([*frames, frames[0]]):
+        watch.see(Frame(number / 10, row, 0.0))
+    rest = watch.rest(scale=1.0)
+    assert np.isnan(rest[1]).all()
+    np.testing.assert_allclose(rest[[0, 2]], 1.0, atol=0.01)
+
+
+def test_numbers_that_would_overflow_are_no_place_to_rest():
+    frames = np.ones((11, 2, 3))
+    frames[:, 0, 0] = 1.5e308
+    rest = watched(frames).rest(scale=1.0)
+    assert np.isnan(rest[0, 0])
+    np.testing.assert_array_equal(rest[1], 1.0)
