@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
 from facert.data import FloatArray
 from facert.errors import InputError
-from facert.names import match
+from facert.names import fitting, instead_of
 
 LARGEST = 1e6
 """Beyond, a gain or a limit is a slip of the pen."""
@@ -91,11 +90,11 @@ class Adjustments:
 
 def _columns(pattern: str, names: Sequence[str]) -> list[int]:
     """The controls that a name, or a name with wildcards, stands for."""
-    if "*" not in pattern:
-        return [int(index) for index in match([pattern], names, "the controls' adjustments")]
-    found = [index for index, name in enumerate(names) if fnmatchcase(name, pattern)]
+    found = fitting(pattern, names)
     if not found:
-        raise InputError(pattern, "a pattern that some control fits", "none", "Check the names.")
+        meant = instead_of(pattern, names)
+        fix = f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
+        raise InputError(pattern, "a control, or a pattern that some fit", "none", fix)
     return found
 
 

@@ -44,6 +44,8 @@ def save(retargeter: Retargeter, path: Path, overwrite: bool) -> None:
         arrays["target.poses"] = retargeter.poses
     if np.isfinite(retargeter.neutral).all():  # else an earlier version did not know it
         arrays["source.neutral"] = retargeter.neutral
+    if retargeter.labelled is not None:
+        arrays["source.labelled"] = retargeter.labelled
     if retargeter.motion is not None:
         arrays |= {f"motion.{n}": array for n, array in retargeter.motion.arrays.items()}
     metadata = {
@@ -64,6 +66,9 @@ def load(path: str | Path) -> Retargeter:
     InputError
         When the file is missing, damaged, not a model, or does not fit together.
     """
+    if not Path(path).exists():
+        fix = "Give the model with -m, or make it: facert train."
+        raise InputError("model", "a file that train wrote", "nothing", fix, str(path))
     arrays, metadata = read_tensors(Path(path), FORMAT)
     with reading(path):
         try:
@@ -96,6 +101,7 @@ def load(path: str | Path) -> Retargeter:
             neutral=arrays.get("source.neutral", np.full(source_units.mean.shape, np.nan)),
             poses=arrays.get("target.poses"),
             motion=_motion(arrays),
+            labelled=arrays.get("source.labelled"),
         )
         _check_fit(retargeter, arrays)
     return retargeter
@@ -125,8 +131,9 @@ def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None
         raise _misfit("source_kind", "markers or weights", repr(kind))
     if len(set(names)) < len(names):
         raise _misfit("source_names", "names that are all different", "one of them twice")
-    _check_poses(retargeter.poses, len(retargeter.controls.names))
     columns = len(names) * (3 if kind == "markers" else 1), len(retargeter.controls.names)
+    _check_rows(retargeter.poses, columns[1], "target.poses")
+    _check_rows(retargeter.labelled, columns[0], "source.labelled")
     for view, count, learned in zip(
         ("source", "target"), columns, retargeter.method.dimensions, strict=True
     ):
@@ -143,10 +150,10 @@ def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None
         raise _misfit("motion.rest", f"{columns[0]} numbers", f"{len(retargeter.motion.rest)}")
 
 
-def _check_poses(poses: FloatArray | None, controls: int) -> None:
+def _check_rows(rows: FloatArray | None, columns: int, field: str) -> None:
     """A file of an earlier version has none."""
-    if poses is not None and (poses.ndim != 2 or poses.shape[1] != controls):
-        raise _misfit("target.poses", f"{controls} columns", f"shape {poses.shape}")
+    if rows is not None and (rows.ndim != 2 or rows.shape[1] != columns):
+        raise _misfit(field, f"{columns} columns", f"shape {rows.shape}")
 
 
 def _misfit(field: str, expected: str, found: str) -> InputError:

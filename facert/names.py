@@ -11,6 +11,7 @@ import difflib
 import re
 from collections import Counter
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -147,6 +148,38 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
     found = np.array(positions, dtype=np.int64)
     _require_different(found, wanted, among, field)
     return found
+
+
+def fitting(pattern: str, names: Sequence[str]) -> list[int]:
+    """Where the names stand that a name in any spelling, or one with wildcards, means.
+
+    >>> fitting("eyeBlink*", ["jawOpen", "eyeBlink_L"]), fitting("JawOpen", ["jawOpen", "jaw*"])
+    ([1], [0])
+    """
+    if pattern not in names and any(wildcard in pattern for wildcard in "*?["):
+        return [index for index, name in enumerate(names) if fnmatchcase(name, pattern)]
+    place = NameIndex(names).find(pattern)
+    return [] if place is None else [place]
+
+
+def instead_of(name: str, among: Sequence[str]) -> str | None:
+    """What a person may have meant by a name that is not there, for a message.
+
+    >>> instead_of("smile", ["smile_L", "smile_R"]), instead_of("smille_L", ["smile_L", "smile_R"])
+    ("'smile*' for both sides", "'smile_L'")
+    """
+    sides = [one for one in among if _without_side(one) == words(name)]
+    if len(sides) > 1:
+        pattern = f"{name}*"
+        if [one for one in among if fnmatchcase(one, pattern)] == sides:
+            return f"{pattern!r} for both sides"
+        return " and ".join(map(repr, sides))
+    near = nearest(name, among)
+    return None if near is None else repr(near)
+
+
+def _without_side(name: str) -> tuple[str, ...]:
+    return tuple(word for word in words(name) if word not in _SIDES.values())
 
 
 def _require_different(

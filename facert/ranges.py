@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 
 from facert.errors import InputError
 
@@ -31,28 +32,24 @@ def parse_range(text: str, option: str) -> tuple[int, ...]:
     InputError
         For anything else.
     """
-    numbers: set[int] = set()
-    for part in text.split(","):
-        found = _RANGE.fullmatch(part.strip())
-        if found is not None:
-            numbers |= _span(text, option, *(int(group or -1) for group in found.groups()))
-        elif part.strip().isdecimal() and len(part.strip()) < 10:
-            numbers.add(int(part))
-        else:
-            raise _bad(text, option)
-    return tuple(sorted(numbers))
+    expected = "a..b with a <= b, a..b:step, or numbers with commas"
+    bad = InputError(option, expected, repr(text), "For instance 10..40:5.", "the options")
+    return _numbers(text, option, bad, default_step)
 
 
 def parse_frames(text: str, option: str) -> tuple[int, ...]:
     """The frames of ``a..b``, all of them, or of a list such as ``0,12,30``, rising.
+
+    As `parse_range` but for the step of a range that tells none.
 
     Raises
     ------
     InputError
         For anything else.
     """
-    parts = [part if ":" in part or ".." not in part else f"{part}:1" for part in text.split(",")]
-    return parse_range(",".join(parts), option)
+    expected = "frames a..b with a <= b, or numbers with commas"
+    bad = InputError(option, expected, repr(text), "For instance 0..20, or 12.", "the options")
+    return _numbers(text, option, bad, lambda *_ends: 1)
 
 
 def default_step(low: int, high: int) -> int:
@@ -63,15 +60,28 @@ def default_step(low: int, high: int) -> int:
     return min(candidates, key=lambda step: abs(math.log(step / third)))
 
 
-def _span(text: str, option: str, low: int, high: int, step: int) -> set[int]:
-    if low > high or step == 0:
-        raise _bad(text, option)
-    steps = range(low, high, default_step(low, high) if step < 0 else step)
+def _numbers(
+    text: str, option: str, bad: InputError, step_of: Callable[[int, int], int]
+) -> tuple[int, ...]:
+    """The numbers, rising; `step_of` tells the step of a range without one."""
+    numbers: set[int] = set()
+    for part in map(str.strip, text.split(",")):
+        found = _RANGE.fullmatch(part)
+        if found is not None:
+            low, high = int(found[1]), int(found[2])
+            step = step_of(low, high) if found[3] is None else int(found[3])
+            if low > high or step == 0:
+                raise bad
+            numbers |= _span(range(low, high, step), high, option)
+        elif part.isdecimal() and len(part) < 10:
+            numbers.add(int(part))
+        else:
+            raise bad
+    return tuple(sorted(numbers))
+
+
+def _span(steps: range, high: int, option: str) -> set[int]:
+    """The steps, and the upper end."""
     if len(steps) > MOST:
         raise InputError(option, f"at most {MOST} numbers", f"{len(steps)}", "Take larger steps.")
     return {*steps, high}
-
-
-def _bad(text: str, option: str) -> InputError:
-    expected = "a..b with a <= b, a..b:step, or numbers with commas"
-    return InputError(option, expected, repr(text), "For instance 10..40:5.", "the options")

@@ -16,7 +16,7 @@ import numpy as np
 
 from facert.adjustments import Adjustments
 from facert.cleaning.detection import without_faults
-from facert.cleaning.estimate import estimate_if_it_moves, grid
+from facert.cleaning.estimate import FEWEST, estimate_if_it_moves, grid
 from facert.cleaning.motion import Motion
 from facert.data import Controls, FloatArray, Source, SourceKind, Take
 from facert.errors import InputError, NumericalError
@@ -24,6 +24,7 @@ from facert.handling import Handling
 from facert.methods.base import Method
 from facert.neutral import at_rest, calibrated
 from facert.normalisation import Normalisation
+from facert.novelty import WORTH_TELLING, Novelty, Shown
 from facert.settings import Settings
 from facert.source_layout import SourceLayout
 from facert.streaming import ABSURD, RetargetStream
@@ -64,6 +65,8 @@ class Retargeter:
         How the source moves, in normalised units, for live streams.
     neutral : array, shape (d_x,)
         The source with the actor at rest, in its units; NaN where it is not known.
+    labelled : array, shape (l, d_x), or None
+        The source in the posed frames, gaps filled; files of earlier versions lack it.
     """
 
     method: Method
@@ -77,6 +80,7 @@ class Retargeter:
     neutral: FloatArray
     poses: FloatArray | None = None
     motion: Motion | None = None
+    labelled: FloatArray | None = None
 
     def retarget(
         self,
@@ -224,6 +228,8 @@ class Retargeter:
             if not adjust.smooth_all:
                 rough = self.method.predict(np.where(np.isnan(X), clean, measured), doubt)
                 said = replace(said, Y=adjust.mixed(said.Y, rough.Y))
+        if len(said.X) >= FEWEST:  # of single frames there is nothing to tell in shares
+            self._tell_what_is_new(said.X)
         params, std = self.finished(said.Y, said.std, adjust)
         cleaned = source.with_matrix(self.source_units.undo(said.X), std_x)
         return self._performance(take, cleaned, params, std)
@@ -249,6 +255,15 @@ class Retargeter:
             np.array([step.params for step in steps]),
             np.array(stds) if stds else None,
         )
+
+    def _tell_what_is_new(self, frames: FloatArray) -> None:
+        """Warn of cleaned, normalised frames (T, d_x) that are like no posed one."""
+        if self.labelled is None or not len(self.labelled):
+            return
+        shown = Shown.by(self.source_units.apply(self.labelled), self.motion)
+        novelty = Novelty.of(shown.left(frames, self.layout.kind), self.layout.names)
+        if novelty.share >= WORTH_TELLING:
+            log.warning("%s", novelty)
 
     def _performance(
         self, take: Take, source: Source, params: FloatArray, std: FloatArray | None

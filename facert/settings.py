@@ -14,6 +14,12 @@ OptimiserName = Literal["lbfgs", "scg"]
 LimitRule = Literal["auto", "declared", "none"]
 Likelihood = Literal["auto", "exact", "vfe", "fitc"]
 
+OF_SHARED = (
+    "latent_dim", "neighbours", "sigma_c", "sigma_t", "source_noise_floor", "target_noise_floor",
+    "likelihood", "inducing", "optimizer", "tolerance", "max_iterations", "checkpoint_every",
+)  # fmt: skip
+"""Settings that only the shared models use."""
+
 
 @dataclass(frozen=True)
 class Settings:

@@ -13,7 +13,7 @@ from facert.data import Controls, FloatArray, Source, Take
 from facert.errors import InputError
 from facert.gplvm.noise import with_noise
 from facert.methods import method_class
-from facert.methods.base import Labelled, Report, Unlabelled
+from facert.methods.base import IN_TARGET_UNITS, Labelled, Report, Unlabelled
 from facert.neutral import at_rest, most_neutral
 from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
@@ -29,8 +29,6 @@ from facert.source_layout import SourceLayout
 from facert.training_set import TrainingSet, choose_training_set
 
 log = logging.getLogger(__name__)
-
-IN_TARGET_UNITS = ("training reconstruction", "error at poses left out")
 
 
 def train(
@@ -113,6 +111,7 @@ def train(
         | _figures(report, seconds, labelled, target_units),
         neutral=neutral,
         motion=prepared.motion,
+        labelled=data.X_labelled,
         poses=keep(data.Y_labelled, take.animation, settings.seed),
     )
 
@@ -193,5 +192,8 @@ def _figures(
             "status": result.status,
         }
     unit = target_units.scale  # of errors, so that they compare with what retarget tells
-    told = {n: v * unit if n in IN_TARGET_UNITS else v for n, v in report.figures.items()}
+    told = {
+        name: value * unit if name.endswith(IN_TARGET_UNITS) else value
+        for name, value in report.figures.items()
+    }
     return figures | told

@@ -40,6 +40,11 @@ def test_smoothing_goes_from_the_measured_to_the_cleaned():
     assert not made.smooth_all
 
 
+def test_a_name_without_its_side_is_answered_with_the_pattern_for_both():
+    with pytest.raises(InputError, match=r"eyeBlink: .*Did you mean 'eyeBlink\*' for both sides\?"):
+        Adjustments.of({"eyeBlink": {"gain": 1.0}}, NAMES)
+
+
 @pytest.mark.parametrize(
     ("tables", "word"),
     [

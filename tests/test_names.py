@@ -13,6 +13,8 @@ from facert.names import (
     NameIndex,
     canonical,
     control_groups,
+    fitting,
+    instead_of,
     match,
     nearest,
     shape_drivers,
@@ -67,6 +69,32 @@ def test_names_are_matched_whatever_their_order(names):
 def test_a_name_without_a_match_is_told_with_the_nearest():
     with pytest.raises(InputError, match=r"'jawOpn' \(and 1 more\), found nearest: 'JawOpen'"):
         match(["jawLeft", "jawOpn", "nose"], ["JawOpen", "JawLeft"], "/source/names")
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("mouthSmile", "'mouthSmile*' for both sides"),
+        ("mouth", "'mouthLeft' and 'mouthRight'"),  # mouth* would be the smile as well
+        ("mouth_smile", "'mouthSmile_L' and 'mouthSmile_R'"),  # no pattern in this spelling
+        ("lid", "'L_lid' and 'R_lid'"),
+        ("mouthSmileL_", "'mouthSmile_L'"),
+        ("puf_L", "'puff_L'"),
+        ("zzz", "None"),
+    ],
+)
+def test_what_was_meant_by_a_name_that_is_not_there(name, meant):
+    names = ["mouthSmile_L", "mouthSmile_R", "mouthLeft", "mouthRight", "L_lid", "R_lid", "puff_L"]
+    assert str(instead_of(name, names)) == meant
+
+
+def test_a_pattern_means_every_name_that_fits_and_a_name_the_one_of_any_spelling():
+    names = ["jawOpen", "jaw*", "eyeBlink_L", "eyeBlink_R", "eyeBlink"]
+    assert fitting("eyeBlink*", names) == [2, 3, 4]
+    assert fitting("eyeBlink_[LR]", names) == fitting("eyeBlink_?", names) == [2, 3]
+    assert fitting("EyeBlinkLeft", names) == [2]
+    assert fitting("jaw*", names) == [1]
+    assert fitting("lid*", names) == fitting("lid", names) == []
 
 
 @pytest.mark.parametrize(("one", "other"), [("m1_12", "m11_2"), ("x+1", "x-1"), ("p.1", "p.-1")])

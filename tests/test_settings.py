@@ -1,3 +1,5 @@
+import re
+
 import pytest
 
 from facert.errors import InputError
@@ -73,3 +75,10 @@ def test_a_file_that_is_no_toml_is_refused(tmp_path, content):
         InputError, match=r"settings\.toml: file: expected (TOML|UTF-8|an existing file)"
     ):
         read_toml(path)
+
+
+def test_a_file_that_is_no_toml_is_answered_with_an_example(tmp_path):
+    (tmp_path / "a.toml").write_text("[jaw")
+    for example in ("latent_dim = 8", '["jaw*"] gain = 1.2'):
+        with pytest.raises(InputError, match=re.escape(f"TOML such as {example}, found")):
+            read_toml(tmp_path / "a.toml", example)

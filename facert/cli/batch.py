@@ -63,7 +63,8 @@ def plan(
     Raises
     ------
     InputError
-        When there is nothing to do, or two results would have the same name.
+        When there is nothing to do, two results would have the same name, or one would take the
+        place of a file that is read, also with `overwrite`.
     OutputExistsError
         For a single OUT that exists.
     """
@@ -79,14 +80,28 @@ def plan(
         raise InputError(
             "--out-dir", "files with a name each", f"two for {twice[0].name}", "Rename one."
         )
-    inputs = {source.resolve() for source in sources}
-    lost = [name for name in outputs if name.resolve() in inputs]
+    inputs = {_identity(source) for source in sources if source.exists()}
+    lost = [name for name in outputs if name.exists() and _identity(name) in inputs]
     if lost:
         raise InputError(
             "--out-dir", "another folder than that of the takes", str(lost[0]), "Give another."
         )
     out_dir.mkdir(parents=True, exist_ok=True)
     return Plan(tuple(zip(sources, outputs, strict=True)), True, 1 if jobs is None else jobs)
+
+
+def require_kept(todo: Plan, *others: Path | None) -> None:
+    """Refuse to write a result over another file that is read with the takes.
+
+    Raises
+    ------
+    InputError
+        When a result would take the place of one of `others`.
+    """
+    for _, output in todo.pairs:
+        for other in others:
+            if other is not None:
+                require_other_file(other, output, str(other))
 
 
 def _single(
@@ -103,9 +118,31 @@ def _single(
         if given is not None:
             raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
     _require_ending(paths[1], endings)
-    if paths[1].exists() and not overwrite:
-        raise OutputExistsError(paths[1])
+    if paths[1].exists():
+        require_other_file(paths[0], paths[1], "IN")
+        if not overwrite:
+            raise _SecondPathExistsError(paths[1])
     return Plan(((paths[0], paths[1]),), many=False)
+
+
+class _SecondPathExistsError(OutputExistsError):
+    """Of two paths the second one exists: perhaps both are takes to read."""
+
+    def __str__(self) -> str:
+        return f"{super().__str__().removesuffix('.')}; for two takes, --out-dir DIR."
+
+
+def require_other_file(source: Path, output: Path, name: str) -> None:
+    """Refuse to write over what is read, whatever it is called."""
+    if source.exists() and output.exists() and _identity(source) == _identity(output):
+        fix = "Give another name: what is read would be lost."
+        raise InputError("OUT", f"another file than {name}", "the same", fix, str(output))
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """The same for every name of a file: other spellings, symbolic and hard links."""
+    found = path.stat()
+    return found.st_dev, found.st_ino
 
 
 def _require_ending(output: Path, endings: tuple[str, ...]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli import console
-from facert.cli.batch import carry_out, plan
+from facert.cli.batch import carry_out, plan, require_kept
 from facert.cli.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
 
 if TYPE_CHECKING:
@@ -88,6 +88,8 @@ def command(
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
 
+    todo = plan(paths, out_dir, ending, jobs, overwrite, ENDINGS)
+    require_kept(todo, map_path, poses_path, rig_path)
     changes = Changes(
         names=read_toml(map_path) if map_path else {},
         poses=read_poses(poses_path, in_fps) if poses_path else None,
@@ -99,7 +101,6 @@ def command(
         start_timecode=start_timecode,
     )
     wanted = Wanted(kind.value if kind else None, target, shapes, in_fps or fps, rig_path)
-    todo = plan(paths, out_dir, ending, jobs, overwrite, ENDINGS)
     carry_out(
         todo,
         partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite),

@@ -13,7 +13,8 @@ from facert.cli.options import OVERWRITE, SHAPES
 from facert.wording import plural
 
 if TYPE_CHECKING:
-    from facert.data import MeshSequence
+    from facert.data import Mesh, MeshSequence, Take
+    from facert.errors import InputError
 
 ENDINGS = (".h5", ".hdf5", ".glb")
 
@@ -68,6 +69,12 @@ def command(
             "More makes fewer targets and a smaller file.",
         ),
     ] = 0.5,
+    in_units: Annotated[
+        str | None,
+        typer.Option(
+            "--in-units", help="What MESH holds, instead of what it says: m, cm, mm, in or ft."
+        ),
+    ] = None,
     shapes: SHAPES = None,
     overwrite: OVERWRITE = False,
 ) -> None:
@@ -76,7 +83,7 @@ def command(
     Points are named after their vertices, as in v1204, unless there is a map or --auto.
     """
     from facert.data import MeshSequence
-    from facert.errors import reading
+    from facert.errors import InputError, reading
     from facert.io.formats import read_source_file
     from facert.io.mesh import read_mesh
     from facert.io.toml import read_toml
@@ -86,10 +93,15 @@ def command(
     _require_output(output, overwrite)
     if auto and map_path:
         raise typer.BadParameter("give --map or --auto, not both")
-    mesh, take = read_mesh(mesh_path, shapes), read_source_file(points_path)
-    where: Where = read_toml(map_path) if map_path else "nearest" if auto else "names"
+    mesh, take = _in_units(read_mesh(mesh_path, shapes), in_units), read_source_file(points_path)
+    where: Where = (
+        read_toml(map_path, "nose = 1204") if map_path else "nearest" if auto else "names"
+    )
     with reading(points_path):
-        points = feature_points(take, mesh, where, rest, fit.value)
+        try:
+            points = feature_points(take, mesh, where, rest, fit.value)
+        except InputError as error:
+            raise _explained(error, mesh, take, auto, fit) from error
     loose: LooseParts = "carry" if carry else "refuse"
     with reading(mesh_path):
         driver = FaceDriver(mesh.vertices, mesh.faces, points.vertices, method, loose)
@@ -102,6 +114,38 @@ def command(
         f"driven by {plural(len(points.vertices), 'point')}{said}",
         markup=False,
     )
+
+
+def _in_units(mesh: Mesh, unit: str | None) -> Mesh:
+    """The mesh in the unit that its numbers are said to have."""
+    from dataclasses import replace
+
+    from facert.units import checked_unit
+
+    return mesh if unit is None else replace(mesh, units=checked_unit(unit, "--in-units"))
+
+
+def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) -> InputError:
+    """What to do about points that lie far from the mesh, given what was asked for."""
+    from facert.errors import InputError
+    from facert.units import in_metres
+
+    if error.field != "points":
+        return error
+    units = [in_metres(mesh.units), in_metres(take.units)]
+    if None not in units and units[0] != units[1]:
+        fix = f"Bring POINTS to the mesh's unit: facert convert --units {mesh.units}."
+    elif auto and fit != Fit.none:
+        fix = (
+            "--auto works for the points of this very face alone, and --fit cannot change that: it "
+            "needs to know the vertices. Give them with --map (or v1204-names) instead of --auto."
+        )
+    elif auto:
+        fix = "For another face's points give --map (or v1204-names) and --fit, instead of --auto."
+    else:
+        fix = "For another face's points, or other units, add --fit."
+    told = f"MESH in {mesh.units or 'no unit'}, POINTS in {take.units or 'no unit'}"
+    return InputError(error.field, error.expected, f"{error.found} ({told})", fix, error.where)
 
 
 def _require_output(output: Path, overwrite: bool) -> None:
@@ -121,10 +165,14 @@ def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bo
     from facert.io.glb import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
     from facert.morphs import compact_morphs
+    from facert.units import in_metres
 
     if output.suffix.lower() != ".glb":
         write_mesh_sequence(sequence, output, overwrite)
         return ""
+    if in_metres(sequence.neutral.units) is None:
+        told = "the mesh has no unit that is known: its numbers are written as metres; where they"
+        console.log.warning("%s are not, say so: --in-units cm", told)
     morphs = compact_morphs(sequence, tolerance)
     write_glb(morphs, output, overwrite)
     unit = f" {sequence.neutral.units}" if sequence.neutral.units else ""

@@ -100,7 +100,7 @@ def command(
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
     from facert.evaluation.summary import summarise
-    from facert.io.formats import read_rig_file
+    from facert.io.formats import read_rig_file, targets_for
     from facert.methods.device import find_device
     from facert.settings import Settings
 
@@ -109,11 +109,12 @@ def command(
         find_device(device)
     settings = Settings(device=device)
     protocol = Protocol(split.value, noise, missing, test_frames, seed)
+    of_take, of_across = targets_for(target, take, across)
     with reading(take or BUILT_IN):
         problem = make_problem(
-            _read(take, target),
+            _read(take, of_take),
             protocol,
-            None if across is None else _read(across, target),
+            None if across is None else _read(across, of_across),
             None if rig is None else read_rig_file(rig, shapes),
         )
         grid = asked.grid(problem)

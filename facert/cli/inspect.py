@@ -30,7 +30,8 @@ def command(
     if as_json:
         typer.echo(json.dumps({"file": str(path), **facts}, indent=2, ensure_ascii=False))
     else:
-        console.out.print(_table(path.name, facts), soft_wrap=False)
+        shown = _model_facts(facts) if facts["kind"] == "model" else facts
+        console.out.print(_table(path.name, shown), soft_wrap=False)
 
 
 def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]:
@@ -56,6 +57,19 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
         console.log.info("several targets: --target shows one of them")
         facts["controls_of_targets"] = {name: len(controls) for name, controls in targets.items()}
     return facts
+
+
+def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a model, for people: the settings that its method uses, and plain names of figures."""
+    from facert.cli.train import FOR_PEOPLE
+    from facert.methods import method_class
+    from facert.settings import OF_SHARED
+
+    settings, figures = facts["settings"], facts["figures"]
+    idle = () if method_class(settings["method"]).stepwise else OF_SHARED
+    used = {name: value for name, value in settings.items() if name not in idle}
+    told = {FOR_PEOPLE.get(name, name): value for name, value in figures.items()}
+    return {**facts, "settings": used, "figures": told}
 
 
 def _table(title: str, facts: Mapping[str, Any]) -> Table:

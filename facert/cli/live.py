@@ -23,7 +23,7 @@ from facert.cli.train import DEFAULT_MODEL
 
 if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
-    from facert.live.frames import Counters, Receiver
+    from facert.live.frames import Receiver
     from facert.live.senders import UdpSender
     from facert.retargeter import Retargeter
 
@@ -114,7 +114,7 @@ def command(
         stack.callback(recordings.close)
         kept = recordings.source(record) if record else None
         files = [recordings.poses(end.path) for end in ends if isinstance(end, File)]
-        senders = _open_senders(stack, ends, controls.names, receiver.counters)
+        senders = _open_senders(stack, ends, controls.names, receiver)
         with reading(source):
             handling = partial(
                 chosen_handling,
@@ -130,12 +130,14 @@ def command(
         stack.enter_context(_settled())
         stack.enter_context(_first())
         status = stack.enter_context(Status(session))
-        _announce(begin, listen, receiver)
+        _announce(begin, listen, receiver, ends)
         if neutral is not None:
             _announce_rest(neutral, retargeter)
         try:
             session.run(Limits.of(frames, seconds), stopped, status.show)
         finally:  # a performance is not to be had again
+            if session.counters.mapped and mapper.is_uncalibrated:
+                console.log.warning("ended before --neutral was over: no pose is calibrated")
             written = recordings.write(receiver.start_timecode)
     print_summary(session, written, as_json)
 
@@ -170,26 +172,35 @@ def _open_receiver(
 
 
 def _open_senders(
-    stack: ExitStack, ends: Sequence[Address | File], controls: tuple[str, ...], counters: Counters
+    stack: ExitStack, ends: Sequence[Address | File], controls: tuple[str, ...], receiver: Receiver
 ) -> list[UdpSender]:
+    from facert.live.echo import refuse_echo
     from facert.live.endpoints import Address, open_sender
+    from facert.live.receivers import UdpReceiver
 
     senders = []
     for end in ends:
         if isinstance(end, Address):
-            senders.append(open_sender(end, controls, counters))
+            senders.append(open_sender(end, controls, receiver.counters))
             stack.callback(senders[-1].close)
+            if isinstance(receiver, UdpReceiver):
+                refuse_echo(receiver, senders[-1])
     return senders
 
 
-def _announce(begin: Address | File, listen: str, receiver: Receiver) -> None:
-    from facert.live.endpoints import LOOPBACK
+def _announce(
+    begin: Address | File, listen: str, receiver: Receiver, ends: Sequence[Address | File]
+) -> None:
+    from facert.live.endpoints import LOOPBACK, Address
     from facert.live.receivers import UdpReceiver
 
     if isinstance(receiver, UdpReceiver):
         alone = " (this machine alone; --listen 0.0.0.0 for others)" if listen == LOOPBACK else ""
         place = f"{listen}:{receiver.port}{alone}"
         console.log.info("listens for %s on %s", begin.kind, place)
+    for end in ends:
+        if isinstance(end, Address):
+            console.log.info("sends %s to %s", end.kind, end.place)
 
 
 def _announce_rest(seconds: float, retargeter: Retargeter) -> None:

@@ -100,6 +100,7 @@ def _counts(counters: Counters) -> str:
         "without a face": counters.hidden,
         "without a pose": counters.failed,
         "not sent": counters.unsent,
+        "heard by nobody": counters.unheard,
     }
     return ", ".join([always, *(f"{count} {name}" for name, count in others.items() if count)])
 

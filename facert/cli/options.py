@@ -85,7 +85,9 @@ def chosen_handling(
     adjustments = None
     if controls is not None:
         with reading(controls):
-            adjustments = Adjustments.of(read_toml(controls), retargeter.controls.names)
+            adjustments = Adjustments.of(
+                read_toml(controls, '["jaw*"] gain = 1.2'), retargeter.controls.names
+            )
     return Handling(
         detect=not no_detect,
         smooth=not no_smooth,

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, TARGET
+from facert.errors import InputError, reading
 from facert.wording import plural
+
+if TYPE_CHECKING:
+    from facert.data import Take
 
 
 def command(
@@ -26,15 +31,42 @@ def command(
 ) -> None:
     """Draw controls over time, with their uncertainty and the truth."""
     from facert.cli.pictures import require_picture_name, save_picture
-    from facert.errors import reading
-    from facert.io.formats import read_take_file
+    from facert.io.formats import read_take_file, targets_for
+    from facert.view.faces import require_poses
     from facert.view.plots import plot_controls
 
     require_picture_name(output, overwrite)
-    take = read_take_file(take_path, target)
-    truth = read_take_file(truth_path, target) if truth_path else None
+    ours, theirs = targets_for(target, take_path, truth_path)
+    take = read_take_file(take_path, ours)
+    truth = read_take_file(truth_path, theirs) if truth_path else None
     names = [name.strip() for name in controls.split(",")] if controls else []
+    with reading(take_path):
+        require_poses(take)
+    if truth_path and truth:
+        with reading(truth_path):
+            take, truth = _comparable(take, truth, names)
     with reading(take_path):
         figure = plot_controls(take, truth, names)
     save_picture(figure, output, overwrite)
     console.out.print(f"{output}: {plural(len(figure.axes), 'control')}", markup=False)
+
+
+def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:
+    """Both with the controls that they share, in the spelling of the take."""
+    from facert.shared_controls import shared_controls
+
+    fix = "Give the truth of this take, or choose another --target."
+    if len(truth) != len(take):
+        raise InputError("--truth", plural(len(take), "frame"), f"{len(truth)}", fix)
+    shared = shared_controls(truth, take)
+    if shared is None or not len(shared.truth.labels):
+        raise InputError("--truth", "poses of some of the take's controls", "none", fix)
+    lacking = [name for name in names if name in shared.of_result]
+    if lacking:
+        found = f"none among its {plural(len(shared.names + shared.of_truth), 'control')}"
+        raise InputError(
+            "--truth", f"poses of {lacking[0]!r}", found, "Leave it out of --controls."
+        )
+    if shared.told:
+        console.log.info("%s", shared.told)
+    return shared.result, shared.truth

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES
 from facert.wording import plural
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from facert.data import IntArray, Mesh
 
 app = typer.Typer(help="Feature points of a face.", no_args_is_help=True)
 
@@ -33,7 +38,8 @@ def suggest(
 ) -> None:
     """Print the vertices that serve driving best, the most useful first.
 
-    With commas between them, as `facert simulate --vertices` takes them.
+    The numbers are those of the picture. The last line has the vertices with commas between them,
+    as `facert simulate --vertices` takes them.
     """
     from facert.cli.pictures import require_picture_name, save_picture
     from facert.errors import reading
@@ -49,4 +55,26 @@ def suggest(
     if picture is not None:
         save_picture(draw_points(rig.mesh, chosen), picture, overwrite)
         console.log.info("%s: %s on the face", picture, plural(len(chosen), "point"))
+    console.out.print(_table(rig.mesh, chosen))
     console.out.print(",".join(map(str, chosen)), markup=False)
+
+
+def _table(mesh: Mesh, chosen: IntArray) -> Table:
+    """Number, vertex, place and the number of the opposite point of each."""
+    from rich import box
+    from rich.table import Table
+
+    from facert.topology.symmetry import mirror_vertices
+
+    unit = f", {mesh.units}" if mesh.units else ""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("number", "vertex", f"x{unit}", f"y{unit}", f"z{unit}", "opposite"):
+        table.add_column(title, justify="right")
+    numbers = {vertex: str(number) for number, vertex in enumerate(chosen.tolist(), start=1)}
+    opposite = mirror_vertices(mesh.vertices)
+    for vertex, number in numbers.items():
+        place = (f"{value:.4g}" for value in mesh.vertices[vertex])
+        across = int(opposite[vertex])
+        partner = "" if across == vertex else numbers.get(across, "")
+        table.add_row(number, str(vertex), *place, partner)
+    return table

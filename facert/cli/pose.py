@@ -45,8 +45,21 @@ def command(
         Path | None, typer.Option("--poses", help="A take with known poses, instead of a model's.")
     ] = None,
     start: Annotated[
-        str, typer.Option("--from", metavar="TAKE:FRAME", help="Correct this retargeted frame.")
+        str,
+        typer.Option(
+            "--from",
+            metavar="TAKE:FRAME",
+            help="Correct this retargeted frame: all its controls follow, but for those of --hold.",
+        ),
     ] = "",
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--hold",
+            metavar="PATTERN",
+            help="With --from: controls that keep their value, as 'mouth*'; again for more.",
+        ),
+    ] = None,
     soft: Annotated[
         float, typer.Option(min=0.0, help="Standard deviation of the values; 0: exactly.")
     ] = 0.0,
@@ -78,6 +91,8 @@ def command(
         return open_page(files, overwrite, host, port)
     if not wanted:
         raise typer.BadParameter("give values with --set NAME=VALUE, or --view for sliders")
+    if hold and not start:
+        raise typer.BadParameter("--hold keeps values of a frame: give it with --from TAKE:FRAME")
     model = model or DEFAULT_MODEL
     given = _parse(wanted)
     import facert
@@ -92,7 +107,13 @@ def command(
     assert character is not None
     with reading(poses or model):
         done = facert.complete_pose(
-            character, given, soft=soft, samples=samples, seed=seed, start=begun
+            character,
+            given,
+            soft=soft,
+            samples=samples,
+            seed=seed,
+            start=begun,
+            hold=hold or (),
         )
     console.out.print(_table(done, soft))
     if output is not None:
@@ -118,7 +139,7 @@ def _parse(wanted: list[str]) -> dict[str, float]:
 
 
 def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
-    """The frame of ``TAKE:FRAME``, retargeted."""
+    """The frame of ``TAKE:FRAME``: as TAKE has it where that is a result, else retargeted."""
     from dataclasses import replace
 
     from facert.io.formats import read_source_file
@@ -130,12 +151,24 @@ def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
     if frame >= len(take):
         expected = f"a frame from 0 to {len(take) - 1}"
         raise InputError("--from", expected, number, "Choose another.", where=path)
-    source = replace(take.source, values=take.source.values[[frame]])
-    one = replace(
-        take, time=take.time[[frame]], source=source, params=None, std=None, animation=None
-    )
+    one = _frame(take, frame)
+    known = None if take.controls is None else set(take.controls.names)
+    if one.std is not None and known == set(retargeter.controls.names):
+        return one
     with reading(path):
-        return retargeter.retarget(one)
+        return retargeter.retarget(replace(one, params=None, std=None))
+
+
+def _frame(take: Take, frame: int) -> Take:
+    """One frame of a take; what has a standard deviation was retargeted already."""
+    from dataclasses import replace
+
+    source = replace(take.source, values=take.source.values[[frame]])
+    params = None if take.params is None else take.params[[frame]]
+    std = None if take.std is None or frame not in take.labels else take.std[[frame]]
+    return replace(
+        take, time=take.time[[frame]], source=source, params=params, std=std, animation=None
+    )
 
 
 def _table(done: CompletedPose, soft: float) -> Table:
@@ -159,13 +192,20 @@ def _table(done: CompletedPose, soft: float) -> Table:
     for index in first + shown:
         name, value = done.controls.names[index], done.pose[index]
         spread = f"{done.std[index]:.3f}" if done.std[index] else ""
-        mark = "" if name not in done.given else f"near {done.given[name]:g}" if soft else "given"
-        style = "bold" if mark else None
+        style = "bold" if name in done.given else None
+        mark = _mark(done, name, soft)
         table.add_row(Text(name), f"{value:.3f}", spread, mark, style=style)
     if len(others) > len(shown):
         table.caption = f"{len(others) - len(shown)} more at 0"
         table.caption_justify = "left"
     return table
+
+
+def _mark(done: CompletedPose, name: str, soft: float) -> str:
+    """Where a control's value comes from, if not from the others'."""
+    if name in done.given:
+        return f"near {done.given[name]:g}" if soft else "given"
+    return "held" if name in done.held else ""
 
 
 def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,14 @@ from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.data import IntArray, Take
+
+
+class Limits(StrEnum):
+    """What poses are clipped to."""
+
+    auto = "auto"
+    declared = "declared"
+    none = "none"
 
 
 def command(
@@ -48,6 +57,13 @@ def command(
         int | None,
         typer.Option(min=1, help="Directions of motion in a window.", show_default="5 or 3"),
     ] = None,
+    limits: Annotated[
+        Limits,
+        typer.Option(
+            help="Clip poses to: auto (declared, else the range of the key poses and old "
+            "animation), declared, or none, which keeps what goes beyond."
+        ),
+    ] = Limits.auto,
     target: TARGET = None,
     overwrite: OVERWRITE = False,
 ) -> None:
@@ -64,7 +80,7 @@ def command(
     from facert.topology.takes import Propagation, propagate_poses, propagate_positions
 
     require_take_output(output, overwrite)
-    how = Propagation(method, window, dim)
+    how = Propagation(method, window, dim, limits.value)
     if positions is None:
         take = read_take_file(source, target)
         with reading(source):

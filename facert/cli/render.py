@@ -58,7 +58,7 @@ def command(
     from facert.cli.faces import open_face
     from facert.cli.pictures import ENDINGS, require_picture_name
     from facert.errors import reading
-    from facert.io.formats import read_rig_file
+    from facert.io.formats import read_rig_file, targets_for
 
     require_picture_name(output, overwrite, (*ENDINGS, *CLIP_RATES))
     wanted, others = _parse(frames), [(one, one.stem) for one in beside or []]
@@ -66,9 +66,11 @@ def command(
     if len(others) >= MOST:
         raise typer.BadParameter(f"at most {MOST} faces fit on a picture")
     rig = read_rig_file(rig_path, shapes) if rig_path else None
+    ours, *theirs = targets_for(target, path, *(one for one, _ in others))
     with ExitStack() as stack, reading(path):
-        face, take = open_face(stack, path, rig, target)
-        faces = [face] + [open_face(stack, one, rig, target, label)[0] for one, label in others]
+        face, take = open_face(stack, path, rig, ours)
+        beside_it = zip(others, theirs, strict=True)
+        faces = [face] + [open_face(stack, one, rig, t, label)[0] for (one, label), t in beside_it]
         if output.suffix.lower() not in CLIP_RATES:
             said = _sheet(faces, take, wanted, size, output, overwrite)
         else:

@@ -148,27 +148,34 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _tell_error(take: Take, result: Take, retargeter: Retargeter) -> None:
     """RMS over the poses that the input held, but for those that the model was trained on."""
-    unseen = retargeter.without_known(take)
-    if len(take.labels) and not len(unseen.labels):
+    from facert.shared_controls import shared_controls
+
+    if not len(take.labels):
+        return
+    shared = shared_controls(take, result)
+    if shared is None:
+        console.log.info("the poses in the input are of other controls: not compared")
+        return
+    unseen = retargeter.without_known(shared.truth)
+    if not len(unseen.labels):
         console.log.info("no pose in the input that it was surely not trained on: no error to tell")
-    else:
-        _print_errors(unseen, result)
+        return
+    # Where the input lacks controls of the model, its poses cannot be told from the known ones.
+    trust = "" if shared.of_result else " that it was not trained on"
+    _print_errors(unseen, shared.result, trust)
+    if shared.told:
+        console.log.info("%s", shared.told)
 
 
-def _print_errors(truth: Take, result: Take) -> None:
-    """RMS against the truth, where the input held it for the same controls."""
+def _print_errors(truth: Take, result: Take, trust: str) -> None:
+    """RMS against the truth of the same controls."""
     from rich.table import Table
 
     from facert.metrics import compare
 
-    if truth.params is None or truth.controls is None:
-        return
     comparison = compare(truth, result)
-    if comparison is None:
-        console.log.info("the poses in the input are of other controls: not compared")
-        return
-    poses = plural(comparison.frames, "pose")
-    table = Table(title=f"RMS against {poses} that it was not trained on")
+    assert comparison is not None  # they share controls and posed frames
+    table = Table(title=f"RMS against {plural(comparison.frames, 'pose')}{trust}")
     table.add_column("controls")
     table.add_column("number", justify="right")
     table.add_column("RMS", justify="right")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from facert.cli import console
+from facert.cli.batch import require_other_file
 from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
 from facert.errors import InputError, reading
 from facert.wording import plural
@@ -53,13 +54,15 @@ def command(
     """
     from facert.cleaning.stabilisation import stabilise
     from facert.cli.cleaned_take import read_observed, write_beside
-    from facert.io.formats import read_source_file, require_take_output
+    from facert.io.formats import read_source_file, require_take_output, targets_for
 
     require_take_output(output, overwrite)
+    require_other_file(source, output, "IN")
     if like is not None and reference != "mean":
         raise typer.BadParameter("--like and --reference both tell the head pose: give one")
-    pose = _frame(reference) if like is None else read_source_file(like, target)
-    take = read_observed(source, target, no_detect)
+    ours, theirs = targets_for(target, source, like)
+    pose = _frame(reference) if like is None else read_source_file(like, theirs)
+    take = read_observed(source, ours, no_detect)
     with reading(source):
         found = stabilise(take, _names(stable), pose)
     if found.interpolated.any():

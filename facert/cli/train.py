@@ -13,7 +13,7 @@ from facert.cli import console
 from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
-from facert.settings import Settings
+from facert.settings import OF_SHARED, Settings
 
 if TYPE_CHECKING:
     from facert.data import Take
@@ -23,11 +23,9 @@ if TYPE_CHECKING:
 
 DEFAULT_MODEL = Path("model.safetensors")
 DEFAULTS = Settings()
-OF_SHARED = (
-    "latent_dim", "neighbours", "sigma_c", "sigma_t", "source_noise_floor", "target_noise_floor",
-    "likelihood", "inducing", "optimizer", "tolerance", "max_iterations", "checkpoint_every",
-)  # fmt: skip
 SMALL = 0.01  # of numbers below it digits are shown, not decimals
+FOR_PEOPLE = {"seconds": "training seconds"}
+"""Figures whose name alone says too little."""
 
 
 def _setting(name: str, text: str, unset: str = "from the data") -> Any:
@@ -182,7 +180,7 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
     settings = DEFAULTS if begin is None else replace(begin.settings, labels=None)
     if config is not None:
         with reading(config):
-            settings = settings.with_changes(read_toml(config))
+            settings = settings.with_changes(read_toml(config, "latent_dim = 8"))
     with reading("the options"):
         return settings.with_changes({k: v for k, v in options.items() if v is not None})
 
@@ -255,7 +253,9 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
     title = Text(f"{retargeter.settings.method} in {output}")
     table = Table(title=title, show_header=False)
     for name, value in figures.items():
-        table.add_row(name, _shown(value) if isinstance(value, float) else str(value))
+        table.add_row(
+            FOR_PEOPLE.get(name, name), _shown(value) if isinstance(value, float) else str(value)
+        )
     console.out.print(table)
 
 

@@ -42,19 +42,20 @@ def command(
     Ctrl-C ends it.
     """
     import facert
-    from facert.io.formats import read_rig_file, read_source_file, read_take_file
+    from facert.io.formats import read_rig_file, read_source_file, read_take_file, targets_for
     from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
 
     require_viser()
     from facert.pages.view_page import ViewPage
 
+    ours, theirs = targets_for(target, path, truth_path)
     retargeter = facert.load(model) if model is not None else None
     if retargeter is None:
-        take = read_take_file(path, target)
+        take = read_take_file(path, ours)
     else:
-        take = read_source_file(path, target, retargeter.controls.names)
+        take = read_source_file(path, ours, retargeter.controls.names)
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
-    truth = read_take_file(truth_path, target) if truth_path is not None else None
+    truth = read_take_file(truth_path, theirs) if truth_path is not None else None
     with reading(path):
         performance = _performance(take, rig, truth, retargeter)
         actor = actor_of(take, actor_path, shapes)

@@ -308,6 +308,11 @@ def _check_posed(take: Take) -> None:
 
 
 def _too_short(labels: int, unlabelled: int, problem: Problem, posed: int) -> InputError:
+    tested_too = not problem.across and problem.protocol.split == "random"
+    if tested_too and labels >= posed > 1:
+        expected = f"at most {posed - 1} labels: one pose is needed for the test"
+        fix = "Ask for fewer labels, or pose more frames."
+        return InputError("/target/params", expected, f"{labels}", fix)
     parts = [f"{labels} labels", f"{unlabelled} unlabelled frames"]
     parts += [f"{unlabelled} unlabelled poses"] if problem.poses_are_frames else []
     return InputError(

@@ -51,6 +51,7 @@ Kind = Literal["take", "rig"]
 
 HDF5_ENDINGS = (".h5", ".hdf5")
 GLTF_ENDINGS = (".glb", ".gltf")
+_WITH_TARGETS = (".npz", *GLTF_ENDINGS)
 TAKE_OUTPUTS = (*HDF5_ENDINGS, ".livelink.csv", ".csv", ".json")
 TAKE_ENDINGS = (*HDF5_ENDINGS, ".csv", ".json", ".txt", ".c3d", ".trc", *GLTF_ENDINGS, ".npz")
 
@@ -90,7 +91,8 @@ def read_any(
     Raises
     ------
     InputError
-        For an unknown ending, or a file that is not what its ending says.
+        For an unknown ending, a file that is not what its ending says, or a `target` of a take
+        that cannot have several.
     """
     path = Path(path)
     found: Kind = "rig" if _holds_rig(path) else "take"
@@ -125,6 +127,15 @@ def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
         return {}
     targets = npz.read_targets(path)
     return targets if len(targets) > 1 else {}
+
+
+def targets_for(target: str | None, *paths: Path | None) -> list[str | None]:
+    """What ``--target`` says of several takes: it is for those that can have several targets.
+
+    Where none can, it is for all of them, so that reading the first refuses it.
+    """
+    able = [path is not None and Path(path).suffix.lower() in _WITH_TARGETS for path in paths]
+    return [target if can or not any(able) else None for can in able]
 
 
 def read_source_file(path: Path, target: str | None = None, controls: Sequence[str] = ()) -> Take:
@@ -260,6 +271,9 @@ def _read_take(path: Path, target: str | None, fps: float | None) -> Take:
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise _unknown_input(path)
+    if target and path.suffix.lower() not in _WITH_TARGETS:
+        able, fix = "an .npz take or a .glb animation", "Leave it out: there is nothing to choose."
+        raise InputError("--target", able, f"a {path.suffix} take", fix, where=str(path))
     return reader()
 
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from facert.data import Take
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.text import check_width, read_csv, read_header, to_numbers
 from facert.labelling import Poses, poses_of
+from facert.sanity import foretold_poses
+from facert.wording import plural
+
+log = logging.getLogger("facert")
 
 MAX_FRAMES = 2**31
 
@@ -23,13 +29,32 @@ def read_poses(path: Path, fps: float | None = None) -> Poses:
     Raises
     ------
     InputError
-        When the file cannot be read, a row names no frame, or there are no poses in it.
+        When the file cannot be read, a row names no frame, there are no poses in it, or a model
+        foretold them all.
     """
     path = Path(path)
     with reading(path):
         if path.suffix.lower() == ".csv" and _names_frames(read_header(path)):
             return replace(_read_numbered(path), where=str(path))
-        return replace(poses_of(read_take_file(path, fps=fps)), where=str(path))
+        take = read_take_file(path, fps=fps)
+        _require_set(take, path)
+        return replace(poses_of(take), where=str(path))
+
+
+def _require_set(take: Take, path: Path) -> None:
+    """Refuse a result of retargeting: what a model foretold would pass for somebody's poses."""
+    foretold = foretold_poses(take)
+    if foretold and foretold == len(take.labels):
+        raise InputError(
+            "/target/std",
+            "poses that somebody set",
+            f"a standard deviation for all {foretold}: a model foretold them",
+            f"Give the poses that were set; to take these nonetheless, make a table of them first: "
+            f"facert convert {path.name} {path.stem}.csv.",
+        )
+    if foretold:
+        poses = plural(foretold, "pose")
+        log.warning("%s: %s with a standard deviation: foretold, taken as set", path.name, poses)
 
 
 def _names_frames(header: tuple[str, ...]) -> bool:

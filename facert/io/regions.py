@@ -16,6 +16,7 @@ from facert.errors import reading
 from facert.io.toml import read_toml
 from facert.regions.nouns import Regions
 
+EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
 WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -29,7 +30,7 @@ def read_regions(path: Path) -> Regions:
         When the file is missing, too large, not TOML, or holds anything else.
     """
     with reading(path):
-        return Regions.of(read_toml(path))
+        return Regions.of(read_toml(path, EXAMPLE))
 
 
 def regions_text(regions: Regions) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,10 @@ from facert.errors import InputError
 MAX_BYTES = 2**29
 """Largest text file that is read: half a gibibyte."""
 MAX_HEADER = 2**20
+SEPARATORS = ",;\t"
+
+_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
+_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 
 
 @dataclass(frozen=True)
@@ -63,11 +68,14 @@ def read_header(path: Path) -> tuple[str, ...]:
     """The cells of the first line, to tell one kind of CSV file from another."""
     with existing_file(path).open(encoding="utf-8-sig", errors="replace") as file:
         line = file.readline(MAX_HEADER)
-    return tuple(cell.strip() for cell in line.split(","))
+    return tuple(cell.strip() for cell in line.split(_separator(line)))
 
 
 def read_csv(path: Path) -> tuple[tuple[str, ...], list[Row]]:
     """Read a CSV file with a header; blank lines are skipped.
+
+    Where the header is separated by semicolons or tabs, as Excel does in much of Europe, so are
+    the rows, and their numbers may have decimal commas.
 
     Returns
     -------
@@ -79,15 +87,31 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Row]]:
     InputError
         When the file cannot be read, or has no header.
     """
-    reader = csv.reader(read_text(path).splitlines(), strict=True)
+    lines = read_text(path).splitlines()
+    separator = _separator(next(filter(str.strip, lines), ""))
+    reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
         rows = [Row(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         line = f"line {reader.line_num}"
-        raise InputError(line, "comma-separated cells", str(error), "Export it again.") from error
+        raise InputError(line, "separated cells", str(error), "Export it again.") from error
     if len(rows) < 2:
         raise InputError("file", "a header and rows", f"{len(rows)} lines", "Export it again.")
-    return tuple(cell.strip() for cell in rows[0].cells), rows[1:]
+    body = rows[1:] if separator == "," else _with_points(rows[1:])
+    return tuple(cell.strip() for cell in rows[0].cells), body
+
+
+def _separator(header: str) -> str:
+    """Whichever gives a header the most cells; the comma where two give as many."""
+    return max(SEPARATORS, key=header.count)
+
+
+def _with_points(rows: list[Row]) -> list[Row]:
+    """Decimal points for decimal commas, unless both occur: then a comma may part thousands."""
+    cells = [cell.strip() for row in rows for cell in row.cells]
+    if any(map(_POINT.fullmatch, cells)):
+        return rows
+    return [Row(row.line, [_COMMA.sub(r"\1.\2", cell) for cell in row.cells]) for row in rows]
 
 
 def check_width(rows: Sequence[Row], header: Sequence[str]) -> None:

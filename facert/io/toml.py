@@ -1,4 +1,4 @@
-"""Settings in a TOML file."""
+"""What a person writes in a TOML file."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ from facert.errors import InputError, reading
 from facert.io.text import read_text
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
     """The table in a TOML file; whoever takes it checks its names and values.
+
+    Parameters
+    ----------
+    path : Path
+    example : str
+        Of what such a file holds, for the message.
 
     Raises
     ------
@@ -23,5 +29,5 @@ def read_toml(path: Path) -> dict[str, Any]:
             return tomllib.loads(read_text(path))
         except (ValueError, RecursionError) as error:
             raise InputError(
-                "file", "TOML such as 'latent_dim = 8'", f"{error}", "Correct the file."
+                "file", f"TOML such as {example}", f"{error}", "Correct the file."
             ) from error

@@ -13,7 +13,7 @@ from facert.live.frames import Counters, Decoder, Encoder
 from facert.live.ifacialmocap import IFacialMocapDecoder
 from facert.live.livelink import LiveLinkDecoder, LiveLinkEncoder
 from facert.live.receivers import UdpReceiver
-from facert.live.senders import SocketAddress, UdpSender
+from facert.live.senders import SocketAddress, UdpSender, written_place
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 LOOPBACK = "127.0.0.1"
@@ -39,7 +39,12 @@ class Address:
 
     def __str__(self) -> str:
         """As it is written on the command line."""
-        return f"{self.kind}:{self.host}:{self.port}"
+        return f"{self.kind}:{self.place}"
+
+    @property
+    def place(self) -> str:
+        """Host and port, as they are written."""
+        return written_place(self.host, self.port)
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ def parse_input(text: str) -> Address | File:
     ValueError
         With what would be understood.
     """
-    place = _parse(text, IN_PORTS, IN_FILES)
+    place = _parse(text, IN_PORTS, IN_FILES, "livelink:11111")
     if isinstance(place, Address) and place.host != LOOPBACK:
         raise ValueError(f"{text!r}: give {place.kind}:PORT, and the address with --listen")
     return place
@@ -72,11 +77,11 @@ def parse_output(text: str) -> Address | File:
     ValueError
         With what would be understood.
     """
-    return _parse(text, OUT_PORTS, OUT_FILES)
+    return _parse(text, OUT_PORTS, OUT_FILES, f"vmc:{LOOPBACK}:39539")
 
 
 def _parse(
-    text: str, ports: Mapping[str, int], files: Mapping[str, tuple[str, ...]]
+    text: str, ports: Mapping[str, int], files: Mapping[str, tuple[str, ...]], example: str
 ) -> Address | File:
     kind, _, rest = text.partition(":")
     if kind in files:
@@ -84,7 +89,8 @@ def _parse(
             raise ValueError(f"{text!r}: expected {kind}:FILE{' or '.join(files[kind])}")
         return File(kind, Path(rest))
     if kind not in ports:
-        raise ValueError(f"{text!r}: expected one of {', '.join([*ports, *files])}, as in livelink")
+        known = ", ".join([*ports, *files])
+        raise ValueError(f"{text!r}: expected one of {known}, as in {example}")
     host, _, port = rest.rpartition(":") if _ends_in_port(rest) else (rest, "", "")
     number = int(port) if port else ports[kind]
     if not 0 <= number < 2**16:

@@ -87,6 +87,8 @@ class Counters:
         Packets that could not be understood.
     unsent : int
         Packets that the system would not send.
+    unheard : int
+        Packets to this machine for which nobody listened, as far as the system tells.
     """
 
     received: int = 0
@@ -97,6 +99,7 @@ class Counters:
     late: int = 0
     bad: int = 0
     unsent: int = 0
+    unheard: int = 0
 
 
 class Decoder(Protocol):

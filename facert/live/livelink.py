@@ -23,7 +23,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data import FloatArray, IntArray
 from facert.errors import InputError
 from facert.live.frames import BadPacketError, Observed, frame_pattern
 from facert.names import ARKIT_NAMES, NameIndex, nearest
@@ -83,7 +83,8 @@ class LiveLinkEncoder:
     Parameters
     ----------
     controls : sequence of str, length P
-        Matched to ARKit's names in any spelling; the packet has no place for others.
+        Matched to ARKit's names in any spelling. A shape that is one in ARKit, and a left and a
+        right half in the character, gets their mean; the packet has no place for others.
 
     Raises
     ------
@@ -92,21 +93,17 @@ class LiveLinkEncoder:
     """
 
     def __init__(self, controls: Sequence[str]) -> None:
-        index = NameIndex(PACKET_NAMES)
-        found = [index.find(name) for name in controls]
-        _tell_foreign(controls, found)
-        known = [(column, place) for column, place in enumerate(found) if place is not None]
-        self._columns, self._places = np.array(known).T
+        self._places, self._left, self._right = _halves(controls)
+        self._values = np.zeros(_COUNT, dtype=">f4")
         name = b"facert"
         device = f"${uuid.uuid4()}".upper().encode()
         self._head = _VERSION.pack(VERSION) + device + _LENGTH.pack(len(name)) + name
         now = time.localtime()
         self._midnight = (now.tm_hour * 60 + now.tm_min) * 60 + now.tm_sec
-        self._values = np.zeros(_COUNT, dtype=">f4")
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """One packet; shapes that the character has no control for are 0."""
-        self._values[self._places] = params[self._columns]
+        self._values[self._places] = 0.5 * (params[self._left] + params[self._right])
         frame, fraction = divmod((self._midnight + time) * RATE, 1.0)
         clock = _TIME.pack(int(frame), fraction, RATE, 1)
         return [self._head + clock + bytes([_COUNT]) + self._values.tobytes()]
@@ -137,9 +134,28 @@ def _values(packet: bytes, start: int) -> FloatArray:
     return values
 
 
-def _tell_foreign(controls: Sequence[str], found: Sequence[int | None]) -> None:
+def _halves(controls: Sequence[str]) -> IntArray:
+    """Places in the packet with the controls whose mean goes there, (3, k): place, left, right.
+
+    A control that is one in ARKit as well is both of its halves.
+    """
+    index, found, halved = NameIndex(controls), [], []
+    for place, name in enumerate(PACKET_NAMES):
+        whole, left, right = (index.find(name + side) for side in ("", "_L", "_R"))
+        if whole is not None:
+            found.append((place, whole, whole))
+        elif left is not None and right is not None:
+            found.append((place, left, right))
+            halved.append(name)
+    used = {column for _, *columns in found for column in columns}
+    _tell_foreign([name for column, name in enumerate(controls) if column not in used], controls)
+    if halved:
+        log.info("Live Link gets the mean of the left and the right %s", ", ".join(halved))
+    return np.array(found, dtype=np.int64).T
+
+
+def _tell_foreign(foreign: Sequence[str], controls: Sequence[str]) -> None:
     """Say which controls the packet has no place for; refuse when that is all of them."""
-    foreign = [name for name, place in zip(controls, found, strict=True) if place is None]
     if len(foreign) == len(controls):
         near = nearest(foreign[0], PACKET_NAMES)
         raise InputError(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -13,10 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import facert
+from facert.cleaning.watching import MarkerWatch
 from facert.errors import FacertError, InputError, NumericalError
 from facert.handling import Handling
 from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
+from facert.live.placement import PlacementWatch
 from facert.live.rest import RestWatch
 
 if TYPE_CHECKING:
@@ -45,7 +48,7 @@ class Loaded:
     retargeter : Retargeter
     handling : Handling
     stream : RetargetStream
-        Maps the session's frames.
+        Maps the session's frames, which are taken to come at `fps`.
     twin : RetargetStream
         Rehearses them, so that the stream's memory stays what the frames made it.
     """
@@ -54,6 +57,7 @@ class Loaded:
     handling: Handling
     stream: RetargetStream
     twin: RetargetStream
+    fps: float | None
 
     def calibrate(self, rest: FloatArray) -> None:
         """Make up for where the actor is at rest."""
@@ -133,7 +137,14 @@ class LiveModel:
         self._next: Loaded | None = None
         self._times: list[float] = []
         self._rest: FloatArray | None = None
-        self._rest_watch = None if rest_seconds is None else RestWatch(rest_seconds)
+        self._rest_watch = None
+        if rest_seconds is not None:
+            seen = self._loaded.handling.detect and pattern.source.kind == "markers"
+            watch = MarkerWatch(len(pattern.source.names)) if seen else None
+            self._rest_watch = RestWatch(rest_seconds, watch)
+        self._placement: PlacementWatch | None = None
+        if rest_seconds is None and pattern.source.kind == "markers":
+            self._placement = PlacementWatch(retargeter, pattern.source.names)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="facert model", daemon=True)
 
@@ -155,6 +166,11 @@ class LiveModel:
         """The one in use."""
         return self._loaded.retargeter
 
+    @property
+    def is_uncalibrated(self) -> bool:
+        """Whether the actor at rest is wanted and not known yet."""
+        return self._rest_watch is not None
+
     def step(self, frame: Frame) -> Streamed:
         """The pose of the next frame.
 
@@ -173,6 +189,8 @@ class LiveModel:
             self._measure_rate(frame.time)
         if self._rest_watch is not None:
             self._rest_watch.see(frame)
+        if self._placement is not None:
+            self._placement.see(frame)
         return _finite(self._loaded.stream, frame)
 
     def prepare(self) -> None:
@@ -183,7 +201,11 @@ class LiveModel:
             self._rest_watch = None
             self._loaded.calibrate(self._rest)
             log.info("calibrated: the actor at rest is known")
-        self._loaded.stream.prepare()
+        if self._placement is not None and self._placement.is_over:
+            self._placement.tell()
+            self._placement = None
+        with suppress(np.linalg.LinAlgError, ArithmeticError):  # the next step meets and tells it
+            self._loaded.stream.prepare()
 
     def rehearse(self, frame: Frame) -> Streamed:
         """Map a frame once more, on a stream beside; see `facert.live.frames.Mapper`."""
@@ -194,18 +216,26 @@ class LiveModel:
         self._times.append(time)
         if len(self._times) == _MEASURED:
             self._fps = nominal_rate(np.array(self._times))
-            if not _is_near(self._fps, self.retargeter):
+            if _is_near(self._fps, self.retargeter):
+                self._loaded = replace(self._loaded, fps=self._fps)
+            else:
                 self._use(self._with_streams(self.retargeter, self._loaded.handling))
 
     def _use(self, loaded: Loaded) -> None:
+        if loaded.fps != self._fps:  # which was measured since
+            loaded = self._with_streams(loaded.retargeter, loaded.handling)
         self._loaded = loaded
         if self._rest is not None:
             loaded.calibrate(self._rest)
 
     def _with_streams(self, retargeter: Retargeter, handling: Handling) -> Loaded:
         names = self._pattern.source.names
-        stream, twin = (retargeter.stream(names, self._fps, handling) for _ in range(2))
-        return Loaded(retargeter, handling, stream, twin)
+        stream = retargeter.stream(names, self._fps, handling)
+        deaf, motion = handling, retargeter.motion
+        if handling.sigma is None and motion is not None:  # a twin has no noise to measure
+            deaf = replace(handling, sigma=motion.sigma * retargeter.source_units.scale)
+        twin = retargeter.stream(names, self._fps, deaf)
+        return Loaded(retargeter, handling, stream, twin, self._fps)
 
     def _prepare(self, retargeter: Retargeter) -> Loaded:
         """A stream for the session's frames, after one that made all code and caches warm."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import select
 import socket
@@ -21,7 +22,11 @@ BUFFER = 2**22
 AT_ONCE = 256
 AT_MOST = 0.005
 """Packets, and seconds, before frames are mapped: a flood must not keep us from that."""
+TOLD = 5
+"""Bad packets that are told about: a flood must not fill the terminal."""
 _LARGEST = 2**16
+
+log = logging.getLogger("facert")
 
 
 class UdpReceiver:
@@ -45,6 +50,11 @@ class UdpReceiver:
         self._socket.setblocking(False)
         with suppress(OSError):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+
+    @property
+    def host(self) -> str:
+        """The address of this machine that it listens on."""
+        return str(self._socket.getsockname()[0])
 
     @property
     def port(self) -> int:
@@ -92,8 +102,8 @@ class UdpReceiver:
             return None
         try:
             observed = self._decoder.decode(packet)
-        except BadPacketError:
-            self.counters.bad += 1
+        except BadPacketError as error:
+            self._count_bad(packet, host, error)
             return None
         self._latest = packet
         if observed is None:
@@ -103,6 +113,14 @@ class UdpReceiver:
             self.counters.late += 1
             return None
         return self._seen(observed, placed, arrived)
+
+    def _count_bad(self, packet: bytes, host: str, error: BadPacketError) -> None:
+        """Count a packet, and tell about it unless there were many."""
+        self.counters.bad += 1
+        if self.counters.bad <= TOLD:
+            log.debug("bad packet of %d bytes from %s: %s", len(packet), host, error)
+        if self.counters.bad == TOLD:
+            log.debug("further bad packets are only counted")
 
     def _seen(self, observed: Observed, placed: float, arrived: float) -> Frame | None:
         """The frame, unless nothing was seen in it."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ipaddress
 import logging
 import socket
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from facert.live.frames import Counters, Encoder, Frame
@@ -17,6 +19,11 @@ SocketAddress = tuple[Any, ...]
 log = logging.getLogger("facert")
 
 
+def written_place(host: str, port: int) -> str:
+    """``127.0.0.1:39539``, or ``[::1]:39539``."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
 class UdpSender:
     """Sends each pose at once and never waits for anybody.
 
@@ -27,7 +34,11 @@ class UdpSender:
     address : tuple
         Resolved, as `socket.sendto` takes it.
     counters : Counters
-        Where packets are counted that the system would not send.
+        Where packets are counted that the system would not send, or that nobody took.
+
+    Attributes
+    ----------
+    address : tuple
     """
 
     def __init__(
@@ -37,24 +48,62 @@ class UdpSender:
         address: SocketAddress,
         counters: Counters,
     ) -> None:
-        self._encoder, self._address, self._counters = encoder, address, counters
+        self.address = address
+        self._told = False
+        self._encoder, self._counters = encoder, counters
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._connected = self._connect()
+
+    @property
+    def place(self) -> str:
+        """Host and port, as they are written."""
+        return written_place(*self.address[:2])
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Send the packets of a pose."""
         for packet in self._encoder.encode(pose.params, frame.time):
             try:
-                self._socket.sendto(packet, self._address)
+                self._pass_on(packet)
             except OSError as error:  # a full buffer, a network that is gone
                 if not self._counters.unsent:
-                    log.warning("packets to %s:%s are lost: %s", *self._address[:2], error.strerror)
+                    log.warning("packets to %s are lost: %s", self.place, error.strerror)
                 self._counters.unsent += 1
 
     def rehearse(self, frame: Frame, pose: Streamed) -> None:
         """Do what `send` does before it sends."""
         self._encoder.encode(pose.params, frame.time)
+
+    def _connect(self) -> bool:
+        """Let the system tell when nobody listens on this machine.
+
+        To another machine, a connected socket would stay with the network that there is now.
+        """
+        if not ipaddress.ip_address(self.address[0].partition("%")[0]).is_loopback:
+            return False
+        try:
+            self._socket.connect(self.address)
+        except OSError:  # told about when there is something to send
+            return False
+        return True
+
+    def _pass_on(self, packet: bytes) -> None:
+        if not self._connected:
+            self._socket.sendto(packet, self.address)
+            return
+        try:
+            self._socket.send(packet)
+        except ConnectionError:  # of the packet before; this one was not sent
+            self._count_unheard()
+            with suppress(ConnectionError):
+                self._socket.send(packet)
+
+    def _count_unheard(self) -> None:
+        if not self._told:
+            log.warning("nobody listens on %s; poses are sent there all the same", self.place)
+            self._told = True
+        self._counters.unheard += 1
 
     def close(self) -> None:
         """Close the socket."""

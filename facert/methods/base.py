@@ -59,6 +59,10 @@ class Prediction:
     X: FloatArray
 
 
+IN_TARGET_UNITS = ("training reconstruction", "error at poses left out")
+"""Figures of a report, or what they end in, that have the unit of normalised poses."""
+
+
 @dataclass(frozen=True)
 class Report:
     """How training went, for people and for the model file.

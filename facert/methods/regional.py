@@ -25,7 +25,15 @@ from facert.data import FloatArray, IntArray
 from facert.errors import InputError
 from facert.learned import DAMAGED, Arrays
 from facert.methods import make_method
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.methods.base import (
+    IN_TARGET_UNITS,
+    Labelled,
+    Method,
+    Prediction,
+    Report,
+    Stream,
+    Unlabelled,
+)
 from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.regions.nouns import MOST
@@ -99,6 +107,11 @@ class _Part:
             return self._frames(X), None
         return self._frames(X), doubt.take(self.columns, axis=1) / self.source_unit**2
 
+    def figures(self, report: Report) -> dict[str, float]:
+        """Of the region's report, in the units of the face."""
+        unit = self.target_unit
+        return {n: v * unit if n in IN_TARGET_UNITS else v for n, v in report.figures.items()}
+
     def in_face_units(self, said: Prediction) -> Prediction:
         std = None if said.std is None else said.std * self.target_unit
         return Prediction(said.Y * self.target_unit, std, said.X * self.source_unit)
@@ -170,13 +183,13 @@ class Regional:
         KeyboardInterrupt
             When the training of a region was interrupted: the others have none.
         """
-        reports = []
+        told = []
         for part in self.parts_:
             report = part.method.fit(part.labelled(labelled), part.unlabelled(unlabelled))
             if report.result is not None and report.result.status == "interrupted":
                 raise KeyboardInterrupt
-            reports.append(report)
-        return Report(figures=_figures(self._names, reports))
+            told.append(part.figures(report))
+        return Report(figures=_together(self._names, told))
 
     def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
@@ -277,16 +290,16 @@ class _RegionalStream:
         return self.method._blend(said, frame)
 
 
-def _figures(names: Sequence[str], reports: Sequence[Report]) -> dict[str, float]:
+def _together(names: Sequence[str], regions: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """What all regions have in common once, the rest under the names of the regions."""
-    first, *others = (report.figures for report in reports)
+    first, *others = regions
     common = {
         name: value for name, value in first.items() if all(o.get(name) == value for o in others)
     }
     own = {
         f"{name}: {figure}": value
-        for name, report in zip(names, reports, strict=True)
-        for figure, value in report.figures.items()
+        for name, told in zip(names, regions, strict=True)
+        for figure, value in told.items()
         if figure not in common
     }
     return {**common, **own}

@@ -8,15 +8,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from viser import Icon
 
-from facert.data import FloatArray
+from facert.data import FloatArray, IntArray
 from facert.names import control_groups
 
 if TYPE_CHECKING:
     from viser import GuiButtonHandle, GuiEvent, GuiSliderHandle, ViserServer
 
 PIN = "● "
-UNFOLDED = 30  # controls; of more, only the first groups are open
+UNFOLDED = 30  # controls; of more, only the shorter groups are open, such as the jaw's
 FINE = 100  # steps of a slider, at least
+
+
+def unfolded_groups(groups: Mapping[str, IntArray]) -> set[str]:
+    """The groups that are open at first: the shortest, up to the one that makes it too many."""
+    left, found = UNFOLDED, set()
+    for group in sorted(groups, key=lambda group: len(groups[group])):
+        if left > 0:
+            found.add(group)
+        left -= len(groups[group])
+    return found
 
 
 class Sliders:
@@ -41,12 +51,12 @@ class Sliders:
     ) -> None:
         self._names, self._bounds, self._moved = names, bounds, moved
         self._handles: dict[int, GuiSliderHandle[float]] = {}
-        left = UNFOLDED
-        for group, members in control_groups(names).items():
-            with server.gui.add_folder(group, expand_by_default=left > 0):
+        groups = control_groups(names)
+        unfolded = unfolded_groups(groups)
+        for group, members in groups.items():
+            with server.gui.add_folder(group, expand_by_default=group in unfolded):
                 for control in members.tolist():
                     self._handles[control] = self._add(server, control)
-            left -= len(members)
 
     def show(self, pose: FloatArray, pins: Mapping[int, float]) -> None:
         """Move the sliders to a pose (P,), and mark those that are pinned."""

@@ -11,13 +11,16 @@ scaled to the standard deviations that the model reports, if it does: E. With th
 controls known, or known with variance s², the rest of the pose follows:
 
     y = p + E_:G (E_GG + s² I)⁻¹ (g - p_G).
+
+Controls that are held keep p, and tell the others nothing: known poses are few, and of many held
+controls E would foretell all others with certainty.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data import FloatArray, IntArray
 from facert.posing.completion import Posed
 from facert.posing.known import Given, KnownPoses
 
@@ -32,6 +35,7 @@ def correct(
     given: Given,
     samples: int,
     rng: np.random.Generator,
+    held: IntArray | None = None,
 ) -> Posed:
     """Correct a pose.
 
@@ -47,6 +51,8 @@ def correct(
     samples : int
         How many other poses to draw.
     rng : numpy.random.Generator
+    held : array of int, shape (h,), optional
+        Other controls, which keep the value of `start`.
     """
     G, E = given.controls, _error_covariance(known.poses, std)
     seen = E[np.ix_(G, G)] + given.soft**2 * np.eye(len(G))
@@ -57,10 +63,17 @@ def correct(
     roots = directions * np.sqrt(np.maximum(variances, 0.0))
     drawn = pose + rng.standard_normal((samples, len(pose))) @ roots.T
     spread = np.sqrt(np.maximum(left.diagonal(), 0.0))
-    pose, drawn = known.clip(pose), known.clip(drawn)
+    posed = Posed(known.clip(pose), spread, known.clip(drawn))
     if given.soft == 0.0:
-        pose[G], spread[G], drawn[:, G] = given.values, 0.0, given.values
-    return Posed(pose, spread, drawn)
+        _fix(posed, G, given.values)
+    if held is not None:
+        _fix(posed, held, start[held])
+    return posed
+
+
+def _fix(posed: Posed, controls: IntArray, values: FloatArray) -> None:
+    """Set some controls (k,) to values that are certain."""
+    posed.pose[controls], posed.std[controls], posed.samples[:, controls] = values, 0.0, values
 
 
 def _error_covariance(poses: FloatArray, std: FloatArray | None) -> FloatArray:

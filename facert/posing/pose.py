@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from facert.data import Controls, FloatArray, IntArray, Source, Take
 from facert.errors import InputError
-from facert.names import NameIndex, match, nearest
+from facert.names import NameIndex, fitting, instead_of, match
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.posing.known import Given, KnownPoses, keep
@@ -39,6 +39,8 @@ class CompletedPose:
         The most probable pose, and the standard deviation of each control.
     samples : array, shape (N, P)
         Other plausible poses.
+    held : tuple of str
+        The controls that kept their value.
     """
 
     controls: Controls
@@ -46,12 +48,14 @@ class CompletedPose:
     pose: FloatArray
     std: FloatArray
     samples: FloatArray
+    held: tuple[str, ...] = ()
 
     @property
     def as_dict(self) -> dict[str, Any]:
         """Everything by name, as plain values."""
         return {
             "given": dict(self.given),
+            "held": list(self.held),
             "pose": self._named(self.pose),
             "std": self._named(self.std),
             "samples": [self._named(sample) for sample in self.samples],
@@ -85,6 +89,7 @@ def complete_pose(
     samples: int = 0,
     seed: int = 0,
     start: Take | None = None,
+    hold: Sequence[str] = (),
 ) -> CompletedPose:
     """The most probable whole pose of a character, given some of its controls.
 
@@ -107,29 +112,35 @@ def complete_pose(
     start : Take, optional
         One frame that was retargeted to this character: the values then correct its pose, see
         `facert.posing.correction`.
+    hold : sequence of str
+        Controls, or patterns such as ``"mouth*"``, that keep the value of `start` unless they are
+        given another.
 
     Raises
     ------
     InputError
-        For unknown names (with the nearest one), values outside of declared limits, or a character
-        with fewer than three known poses.
+        For unknown names (with the nearest one), values outside of declared limits, controls to
+        hold without a start, or a character with fewer than three known poses.
     """
     controls, known = known_poses(character)
     asked = _given(controls, given, soft)
     if samples < 0:
         raise InputError("samples", "a number from 0", f"{samples}", "Ask for some, or for none.")
     _warn_of_range(controls, known, asked)
+    held = _held(controls.names, hold, asked)
     rng = np.random.default_rng(seed)
-    if start is None:
-        completion = Completion.learn(known, asked.controls)
-        _warn_if_far(completion, asked)
-        posed = completion.pose(asked, samples, rng)
+    completion = Completion.learn(known, asked.controls)
+    _warn_if_far(completion, asked)
+    if start is not None:
+        posed = correct(*_start(start, controls), known, asked, samples, rng, held)
+    elif len(held):
+        raise InputError("hold", "a frame to keep the values of", "none", "Give --from TAKE:FRAME.")
     else:
-        pose, std = _start(start, controls)
-        posed = correct(pose, std, known, asked, samples, rng)
+        posed = completion.pose(asked, samples, rng)
     names = [controls.names[index] for index in asked.controls]
     named = dict(zip(names, asked.values.tolist(), strict=True))
-    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples)
+    kept = tuple(controls.names[index] for index in held)
+    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept)
 
 
 def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
@@ -183,10 +194,26 @@ def _positions(wanted: list[str], names: tuple[str, ...]) -> IntArray:
     index = NameIndex(names)
     for name in wanted:
         if index.find(name) is None:
-            near = nearest(name, names)
-            fix = f"Did you mean {near!r}?" if near else f"There are {', '.join(names)}."
+            fix = _other_than(name, names)
             raise InputError("given controls", "names of controls", repr(name), fix)
     return match(wanted, names, "given controls")
+
+
+def _held(names: tuple[str, ...], patterns: Sequence[str], given: Given) -> IntArray:
+    """The controls that fit a pattern and are not given, rising."""
+    found: set[int] = set()
+    for pattern in patterns:
+        places = fitting(pattern, names)
+        if not places:
+            fix = _other_than(pattern, names)
+            raise InputError("hold", "controls, or a pattern that some fit", repr(pattern), fix)
+        found.update(places)
+    return np.setdiff1d(np.array(sorted(found), dtype=np.int64), given.controls)
+
+
+def _other_than(name: str, names: tuple[str, ...]) -> str:
+    meant = instead_of(name, names)
+    return f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
 
 
 def _warn_of_range(controls: Controls, known: KnownPoses, given: Given) -> None:

@@ -20,7 +20,7 @@ from facert.io.rig import FORMAT as RIG_FORMAT
 from facert.io.rig import read_rig
 from facert.io.take import FORMAT as TAKE_FORMAT
 from facert.report.evaluation import read_evaluation
-from facert.report.performance import fits, is_truth_of, performance_section
+from facert.report.performance import fits, performance_section, truth_among
 from facert.report.sections import Fact, Section
 from facert.wording import plural
 
@@ -52,9 +52,9 @@ def folder_sections(
     """Sections of all that lies in a folder; what is none of it is passed over.
 
     Retargeted takes are shown with the first rig in the folder that has their controls, and
-    beside the first take that is posed throughout and has the same frames. A take that is the
-    truth of another one has no section of its own, nor has a table or JSON of curves beside the
-    .h5 file of the same name.
+    beside the take that is posed throughout, has the same frames, and shares most controls. A
+    take that is the truth of another one has no section of its own, nor has a table or JSON of
+    curves beside the .h5 file of the same name.
 
     Raises
     ------
@@ -103,10 +103,7 @@ def _performances(
     results = {path: take for path, take in whole.items() if _is_result(path, take)}
     others = [take for path, take in whole.items() if path not in results]
     known = others if truth is None else [truth]
-    truths = {
-        path: next((one for one in known if is_truth_of(one, take)), None)
-        for path, take in results.items()
-    }
+    truths = {path: truth_among(known, take) for path, take in results.items()}
     for path, take in whole.items():
         if not any(take is found for found in truths.values()):
             with reading(path):

@@ -10,13 +10,17 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined, Template
 
 from facert.io.atomic import replacing
+from facert.report.comparison import comparison_section
 from facert.report.sections import Fact, Report, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
 
 
 def make_report(title: str, sections: tuple[Section, ...]) -> Report:
-    """A report that says what made it."""
+    """A report that says what made it; several results with a truth are compared first."""
+    comparison = comparison_section(sections)
+    if comparison is not None:
+        sections = (comparison, *sections)
     return Report(title, sections, tuple(Fact(name, version(name)) for name in LIBRARIES))
 
 

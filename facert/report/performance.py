@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from facert.data import Rig, Take
 from facert.errors import InputError
 from facert.metrics import Comparison, compare
 from facert.names import shape_drivers
 from facert.report.pictures import embedded
 from facert.report.sections import Fact, Picture, Section, Table
+from facert.shared_controls import SharedControls, shared_controls
 from facert.view.faces import choose_frames, posed_face, require_poses
 from facert.view.plots import plot_controls
 from facert.view.render import render_sheet
@@ -38,17 +42,18 @@ def performance_section(
         When the take has no poses, or rig or truth do not fit it.
     """
     poses = require_poses(take)
-    comparison = None if truth is None else _compared(truth, take)
+    shared = None if truth is None else _shared(truth, take)
     pictures: list[Picture] = []
     if rig is not None:
         faces = [posed_face(take, rig, "character")]
-        faces += [] if truth is None else [posed_face(truth, rig, "truth")]
+        if truth is not None and shared is not None:
+            faces.append(posed_face(truth if fits(rig, truth) else shared.truth, rig, "truth"))
         sheet = render_sheet(faces, choose_frames(poses, FACES), take, PIXELS)
         pictures.append(embedded(sheet, "Frames that differ well", "png"))
-    pictures.append(embedded(plot_controls(take, truth), "The controls that vary most", "svg"))
-    tables = () if comparison is None else (_errors(comparison),)
-    text = "" if comparison is None else f"RMS to the truth {comparison.rms:.4f}"
-    return Section(f"Performance: {name}", text, tuple(pictures), tables, _facts(take, rig))
+    curves = plot_controls(take) if shared is None else plot_controls(shared.result, shared.truth)
+    pictures.append(embedded(curves, "The controls that vary most", "svg"))
+    section = Section(f"Performance: {name}", "", tuple(pictures), (), _facts(take, rig))
+    return section if shared is None else _with_errors(section, shared)
 
 
 def fits(rig: Rig, take: Take) -> bool:
@@ -62,18 +67,41 @@ def fits(rig: Rig, take: Take) -> bool:
     return True
 
 
-def is_truth_of(truth: Take, take: Take) -> bool:
-    """Whether a take holds somebody's poses for every frame of another one."""
-    whole = truth.std is None and len(truth.labels) == len(truth) == len(take)
-    return whole and compare(truth, take) is not None
+def truth_among(known: Sequence[Take], take: Take) -> Take | None:
+    """The take that holds somebody's poses for every frame of another one.
+
+    Of several, the one that shares most of its controls; it is none that shares less than half.
+    """
+    whole = [
+        truth
+        for truth in known
+        if truth.std is None and len(truth.labels) == len(truth) == len(take)
+    ]
+    found = [(truth, shared_controls(truth, take)) for truth in whole]
+    lacking = [
+        (len(shared.of_result), len(shared.of_truth), truth)
+        for truth, shared in found
+        if shared is not None and len(shared.of_result) <= len(shared.names)
+    ]
+    return min(lacking, key=lambda each: each[:2])[2] if lacking else None
 
 
-def _compared(truth: Take, take: Take) -> Comparison:
-    comparison = compare(truth, take) if len(truth) == len(take) else None
-    if comparison is None:
-        expected = f"poses of the same controls in {plural(len(take), 'frame')}"
-        raise InputError("--truth", expected, "others", "Give the truth of this take.")
-    return comparison
+def _shared(truth: Take, take: Take) -> SharedControls:
+    fix = "Give the truth of this take."
+    if len(truth) != len(take):
+        raise InputError("--truth", plural(len(take), "frame"), f"{len(truth)}", fix)
+    shared = shared_controls(truth, take)
+    if shared is None or not len(shared.truth.labels):
+        raise InputError("--truth", "poses of some of the take's controls", "none", fix)
+    return shared
+
+
+def _with_errors(section: Section, shared: SharedControls) -> Section:
+    comparison = compare(shared.truth, shared.result)
+    assert comparison is not None  # they share controls and posed frames
+    text = f"RMS to the truth {comparison.rms:.4f}"
+    text += f"; {shared.told}" if shared.told else ""
+    return replace(section, text=text, tables=(_errors(comparison),), comparison=comparison)
 
 
 def _errors(comparison: Comparison) -> Table:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from facert.metrics import Comparison
+
 
 @dataclass(frozen=True)
 class Fact:
@@ -49,13 +51,24 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """One result."""
+    """One result.
+
+    Parameters
+    ----------
+    title, text : str
+    pictures : tuple of Picture
+    tables : tuple of Table
+    facts : tuple of Fact
+    comparison : Comparison, optional
+        Of a performance with its truth; the page shows it beside those of the others.
+    """
 
     title: str
     text: str = ""
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
     facts: tuple[Fact, ...] = ()
+    comparison: Comparison | None = None
 
 
 @dataclass(frozen=True)

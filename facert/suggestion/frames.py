@@ -13,7 +13,7 @@ of the coverage for calmer frames costs accuracy: these gather around the rest p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -63,7 +63,8 @@ def suggest_frames(
     count : int
     have : sequence of int, or Retargeter
         Frames that are posed already, e.g. ``take.labels``. Or a model: then the take's labels
-        are, and frames count as much as the model is uncertain of them.
+        are, and what the model learned from, and frames count as much as the model is uncertain
+        of them.
     seed : int
         Which frames of a take with more than `MOST_FRAMES` are looked at.
 
@@ -84,20 +85,28 @@ def suggest_frames(
             f"{count} of {len(seen)}",
             "Ask for fewer, or give a longer take.",
         )
-    choice = _choice(take, seen, posed[usable[posed]], count)
-    if model is not None:
+    if model is None:
+        choice = _choice(take, seen, posed[usable[posed]], count)
+    else:
+        take = replace(take, source=model.layout.arrange(take.source))
+        choice = _choice(take, seen, posed[usable[posed]], count, model.labelled)
         choice = choice.weighted(_uncertainty(model, take)[seen])
     chosen = choice.ranked(_preferred(choice, choice.medoids(count), take, seen))
     return Suggestion(seen[chosen], _shares(choice, chosen))
 
 
-def _choice(take: Take, seen: IntArray, posed: IntArray, count: int) -> Choice:
-    """How far the frames that can be suggested are from each other, and from posed ones."""
-    features = _features(take, np.concatenate([seen, posed]))
+def _choice(
+    take: Take, seen: IntArray, posed: IntArray, count: int, learned: FloatArray | None = None
+) -> Choice:
+    """How far the frames that can be suggested are from each other, and from posed ones.
+
+    The latter may be frames of another take, `learned` (l, d).
+    """
+    features = _features(take, np.concatenate([seen, posed]), learned)
     others, known = features[: len(seen)], features[len(seen) :]
     distances, covered = cdist(others, others), np.full(len(seen), np.inf)
     apart = min(APART, 0.25 * float(take.time[-1] - take.time[0]) / (count + len(posed)))
-    if len(posed):
+    if len(known):
         covered = cdist(others, known).min(axis=1)
         barred = _near(take.time[posed], take.time[seen], apart).any(axis=0)
         distances[:, barred] = max(distances.max(), covered.max())  # as good as no pose at all
@@ -138,9 +147,11 @@ def _at_most(frames: IntArray, seed: int) -> IntArray:
     return np.sort(chosen)
 
 
-def _features(take: Take, frames: IntArray) -> FloatArray:
-    """Whitened principal coordinates of some frames, (n, d)."""
+def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> FloatArray:
+    """Whitened principal coordinates of some frames and of `learned` ones after them, (n, d)."""
     matrix = take.source.matrix[frames]
+    if learned is not None:
+        matrix = np.vstack([matrix, learned])
     matrix = matrix[:, ~np.isnan(matrix).all(axis=0)]
     normalised = Normalisation.of(matrix, f"/source/{take.source.kind}").apply(matrix)
     filled = fill_gaps(normalised)

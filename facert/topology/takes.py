@@ -12,6 +12,7 @@ from facert.data import FloatArray, IntArray, Source, Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
 from facert.names import NameIndex
+from facert.settings import LimitRule
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate
 
@@ -28,11 +29,15 @@ class Propagation:
     ----------
     method : str
     width, dim : int, optional
+    limits : {"auto", "declared", "none"}
+        What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
+        range of its key poses and animation.
     """
 
     method: str = DEFAULT
     width: int | None = None
     dim: int | None = None
+    limits: LimitRule = "auto"
 
     def run(self, take: KeyedPerformance) -> FloatArray:
         """All frames (T, G, C)."""
@@ -45,7 +50,7 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     Parameters
     ----------
     take : Take
-        Markers or weights, and poses in the key frames; other poses are not looked at.
+        Markers or weights, and poses in the key frames; poses of other frames are not looked at.
     keys : sequence of int
         Frames.
     how : Propagation, optional
@@ -53,7 +58,7 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     Returns
     -------
     Take
-        Clipped to the controls' declared limits, if there are any.
+        Clipped as `how` says.
 
     Raises
     ------
@@ -65,9 +70,11 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     chosen = _keys_with(take.params[:, :1, None], keys, "/target/params")
     source = filled_source(take.source)[:, None, :]  # one point: a rig follows the whole face
     performance = KeyedPerformance(source, chosen, take.params[chosen][:, None, :])
-    params = (how or Propagation()).run(performance)[:, 0]
-    if take.controls.limits is not None:
-        params = np.clip(params, *take.controls.limits.T)
+    how = how or Propagation()
+    params = how.run(performance)[:, 0]
+    bounds = _bounds(take, take.params[chosen], how.limits)
+    if bounds is not None:
+        params = np.clip(params, *bounds.T)
     return replace(take, params=params, std=None)
 
 
@@ -125,6 +132,17 @@ def propagate_positions(
         units=target.units,
         up_axis=target.up_axis,
     )
+
+
+def _bounds(take: Take, keyed: FloatArray, rule: LimitRule) -> FloatArray | None:
+    """What poses are clipped to, (P, 2); keyed are the poses (l, P) of the key frames."""
+    if rule == "none":
+        return None
+    declared = None if take.controls is None else take.controls.limits
+    if rule == "declared" or declared is not None:
+        return declared
+    known = keyed if take.animation is None else np.vstack([keyed, take.animation])
+    return np.stack([known.min(axis=0), known.max(axis=0)], axis=1)
 
 
 def filled_source(source: Source) -> FloatArray:

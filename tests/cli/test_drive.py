@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -89,6 +91,48 @@ def test_a_glb_holds_morph_targets(facert, files, tmp_path):
     assert (tmp_path / "out.glb").read_bytes()[:4] == b"glTF"
 
 
+def test_a_glb_of_a_mesh_without_a_unit_is_warned_of_unless_it_is_told(
+    facert, files, rig, tmp_path
+):
+    _, take, _ = files
+    mesh, out = tmp_path / "bare.h5", tmp_path / "out.glb"
+    write_rig_file(replace(rig, units=""), mesh)
+    assert "--in-units cm" in facert("drive", mesh, take, out).err
+    told = facert("drive", mesh, take, out, "--in-units", "cm", "--overwrite")
+    assert told.code == 0
+    assert "warning" not in told.err
+    assert b'"scale":[0.01' in out.read_bytes().replace(b" ", b"")
+    assert "warning" not in facert("drive", mesh, take, tmp_path / "out.h5").err
+    refused = facert("drive", mesh, take, out, "--in-units", "ell", "--overwrite")
+    assert refused.code == 3
+    assert "--in-units" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("options", "units", "words"),
+    [
+        (("--auto", "--fit", "axes"), "cm", ("instead of --auto", "MESH in cm, POINTS in cm")),
+        (("--auto",), "", ("--map (or v1204-names) and --fit", "POINTS in no unit")),
+        (("--auto", "--fit", "axes"), "m", ("convert --units cm", "POINTS in m")),
+        ((), "cm", ("add --fit", "MESH in cm")),
+    ],
+)
+def test_points_far_from_the_mesh_are_told_what_would_help(
+    facert, files, tmp_path, options, units, words
+):
+    mesh, take, points = files
+    moved = Take(
+        time=np.arange(20) / 30,
+        source=Source(points + 90.0, [f"v{i}" for i in VERTICES]),
+        units=units,
+    )
+    api.write_take(moved, take, overwrite=True)
+    done = facert("drive", mesh, take, tmp_path / "out.h5", *options)
+    assert done.code == 3
+    for word in words:
+        assert word in done.err
+
+
 def test_a_larger_tolerance_makes_a_smaller_glb(facert, files, tmp_path):
     mesh, take, _ = files
     sizes = []
@@ -141,12 +185,18 @@ def test_names_that_cannot_be_written_are_refused_first(facert, files, tmp_path)
     assert facert("drive", mesh, take, take).code == 2
 
 
-def test_suggested_points_are_vertices_for_simulate(facert, files, tmp_path):
+def test_suggested_points_are_vertices_for_simulate(facert, files, rig, tmp_path):
     mesh, _, _ = files
     picture = tmp_path / "points.png"
     done = facert("points", "suggest", mesh, "-n", 12, "--picture", picture)
     assert done.code == 0, done.err
-    chosen = [int(vertex) for vertex in done.out.strip().split(",")]
+    *table, last = [line for line in done.out.splitlines() if line.strip()]
+    chosen = [int(vertex) for vertex in last.split(",")]
+    rows = [line.split() for line in table[-12:]]
+    assert [(int(row[0]), int(row[1])) for row in rows] == list(enumerate(chosen, start=1))
+    np.testing.assert_allclose(
+        [[float(place) for place in row[2:5]] for row in rows], rig.neutral[chosen], rtol=1e-3
+    )
     assert len(set(chosen)) == 12
     assert max(chosen) < 64
     assert picture.read_bytes()[:4] == b"\x89PNG"

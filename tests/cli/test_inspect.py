@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from facert import Settings, train
 from facert.data import Controls, Rig, Source, Take
 from facert.io.formats import write_rig_file, write_take_file
 
@@ -45,6 +46,23 @@ def test_a_rig_is_shown(facert, tmp_path):
     facts = json.loads(facert("inspect", tmp_path / "rig.h5", "--json").out)
     assert (facts["kind"], facts["vertices"], facts["triangles"]) == ("rig", 3, 1)
     assert "jawOpen" in facert("inspect", tmp_path / "rig.h5").out
+
+
+@pytest.mark.parametrize(("method", "shared"), [("ridge", False), ("sgplvm", True)])
+def test_of_a_model_the_settings_are_shown_that_its_method_uses(
+    facert, make_take, tmp_path, method, shared
+):
+    settings = Settings(method=method, latent_dim=2, neighbours=3, max_iterations=3)
+    model = tmp_path / "model.safetensors"
+    train(make_take(), settings).save(model)
+    shown = facert("inspect", model).out
+    assert "settings limits" in shown
+    assert "training seconds" in shown
+    for name in ("latent dim", "inducing", "sigma c"):
+        assert (f"settings {name}" in shown) == shared
+    facts = json.loads(facert("inspect", model, "--json").out)
+    assert facts["settings"]["latent_dim"] == 2  # programs are told everything
+    assert facts["figures"]["seconds"] > 0.0
 
 
 def test_a_missing_file_is_bad_input(facert, tmp_path):

@@ -98,6 +98,33 @@ def test_the_first_seconds_may_show_the_actor_at_rest(facert, files, take, tmp_p
     assert np.abs(result.params[later] - plain).mean() < 0.5 * np.abs(plain).mean()
 
 
+def test_a_session_that_ends_before_the_actor_at_rest_is_known_says_so(facert, files, tmp_path):
+    path, model = files
+    done = facert(
+        "live", "--in", f"take:{path}", "-m", model, "--speed", 20, "--neutral", 20,
+        "--out", f"h5:{tmp_path / 'out.h5'}", "--frames", 3,
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "no pose is calibrated" in done.err
+    assert (tmp_path / "out.h5").exists()
+
+
+def test_its_own_input_is_refused_as_an_output(facert, files, tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    done = facert("live", "-m", files[1], "--in", f"vmc:{port}", "--out", f"osc:127.0.0.1:{port}")
+    assert done.code == 3
+    assert "where facert itself listens" in done.err
+
+
+def test_it_says_where_poses_go(facert, files):
+    done = facert("live", "--in", "livelink:0", "-m", files[1], "--seconds", 0.1,
+                  "--out", "osc", "--out", "vmc:localhost")  # fmt: skip
+    assert "sends osc to 127.0.0.1:9000" in done.err
+    assert "sends vmc to localhost:39539" in done.err
+
+
 def test_a_session_leaves_the_priority_of_its_process_as_it_was(facert, files):
     before = os.getpriority(os.PRIO_PROCESS, 0)
     done = facert("live", "--in", f"take:{files[0]}", "-m", files[1], "--frames", 2, "--out", "vmc")

@@ -72,6 +72,39 @@ def test_a_frame_of_a_take_is_corrected(facert, files, take, tmp_path):
     assert (np.abs(pose - start)[1:] <= np.abs(pose - start)[0]).all()
 
 
+def frame_alone(model, take, frame):
+    """What a model says of a frame without those around it."""
+    source = replace(take.source, values=take.source.values[[frame]])
+    one = replace(take, time=take.time[[frame]], source=source, params=None, animation=None)
+    return api.load(model).retarget(one).params[0]
+
+
+def test_a_frame_of_a_result_is_taken_as_it_is(facert, files, take, tmp_path):
+    model, _ = files
+    result, out = tmp_path / "result.h5", tmp_path / "pose.h5"
+    told = api.load(model).retarget(take)
+    api.write_take(replace(told, params=told.params + 0.01), result)
+    asked = ("--set", f"jawOpen={float(told.params[7, 0] + 0.01)!r}", "-o", out)
+    done = facert("pose", "-m", model, "--from", f"{result}:7", *asked)
+    assert done.code == 0, done.err
+    np.testing.assert_allclose(api.read_take(out).params[0], told.params[7] + 0.01, atol=1e-9)
+
+
+def test_the_rest_of_a_corrected_frame_can_be_held(facert, files, take, tmp_path):
+    model, path = files
+    out = tmp_path / "pose.h5"
+    asked = ("pose", "-m", model, "--set", "jawOpen=0.3", "--hold", "mouth*", "--hold", "cheekPuff")
+    done = facert(*asked, "--from", f"{path}:7", "-o", out)
+    assert done.code == 0, done.err
+    pose, start = api.read_take(out).params[0], frame_alone(model, take, 7)
+    np.testing.assert_allclose(pose[[1, 3]], start[[1, 3]], atol=1e-12)
+    assert pose[2] != start[2]
+    assert done.out.count(" held") == 2
+    refused = facert(*asked)
+    assert refused.code == 2
+    assert "--from" in refused.err
+
+
 def test_a_take_will_do_instead_of_a_model(facert, files, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "..")
     model, path = files

@@ -49,6 +49,18 @@ def test_keys_method_and_windows_are_options(facert, posed, tmp_path):
     np.testing.assert_allclose(api.read_take(out).params, expected.params, atol=1e-10)
 
 
+def test_what_goes_beyond_the_known_poses_is_kept_when_asked(facert, posed, tmp_path):
+    take, path = posed
+    keys, ranges = [10, 25, 40, 55], {}
+    for limits in ("auto", "none"):
+        out = tmp_path / f"{limits}.h5"
+        asked = ("--keys", "10,25,40,55", "--limits", limits)
+        assert facert("propagate", path, out, *asked).code == 0
+        ranges[limits] = np.ptp(api.read_take(out).params, axis=0)
+    assert (ranges["auto"] <= np.ptp(take.params[keys], axis=0) + 1e-9).all()
+    assert (ranges["none"] > ranges["auto"]).any()
+
+
 def test_feature_points_of_the_character_in_the_key_frames(facert, posed, tmp_path):
     take, path = posed
     markers = 3.0 * take.source.values

@@ -105,7 +105,8 @@ def test_results_in_columns_are_shown_as_well_once_and_against_the_truth(facert,
     assert done.code == 0, done.err
     titles = re.findall("<h2>(.*?)</h2>", page.read_text())
     names = ("result.hdf5", "curves.json", "table.csv")
-    assert titles == [f"Performance: {name}" for name in names] + ["Model: model.safetensors"]
+    sections = [f"Performance: {name}" for name in names]
+    assert titles == ["Comparison", *sections, "Model: model.safetensors"]
     assert page.read_text().count("data:image/png") == 3  # the rig of the folder fits all
     assert len(set(re.findall("<p>(RMS to the truth .*?)</p>", page.read_text()))) == 1
     assert facert("report", folder / "table.csv", "-o", folder / "one.html").code == 0

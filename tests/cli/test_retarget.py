@@ -81,6 +81,28 @@ def test_the_mode_is_chosen(facert, files, trained):
     np.testing.assert_allclose(api.read_take(out).params, expected.params, atol=1e-10)
 
 
+def test_a_truth_with_another_control_is_compared_in_those_that_are_shared(
+    facert, files, make_take
+):
+    take, out, model = files
+    target = arkit(make_take(posed=60, seed=5))
+    names = target.controls.names
+    for changed, told in (
+        ((*names, "tongueOut"), "not compared: tongueOut (only in the truth)"),
+        (names[1:], f"not compared: {names[0]} (only in the result)"),
+    ):
+        params = np.hstack([target.params, target.params[:, :1]])
+        columns = [(*names, "tongueOut").index(name) for name in changed]
+        other = replace(
+            target, controls=Controls(changed), params=params[:, columns], animation=None
+        )
+        api.write_take(other, take, overwrite=True)
+        done = facert("retarget", take, out, "--model", model, "--overwrite")
+        assert done.code == 0, done.err
+        assert "RMS against" in done.out
+        assert told in done.err
+
+
 @pytest.mark.parametrize("ending", ["csv", "livelink.csv"])
 def test_the_ending_decides_the_format(facert, files, tmp_path, ending):
     take, _, model = files
@@ -102,10 +124,10 @@ def test_an_existing_result_stays_unless_it_may_be_replaced(facert, files):
     assert facert("retarget", take, out, "--model", model, "--overwrite").code == 0
 
 
-def test_the_take_may_be_replaced_by_its_result_only_when_asked(facert, files):
+def test_the_take_is_never_replaced_by_its_result(facert, files):
     take, _, model = files
     before = take.read_bytes()
-    assert facert("retarget", take, take, "--model", model).code == 2
+    assert facert("retarget", take, take, "--model", model, "--overwrite").code == 3
     assert take.read_bytes() == before
 
 

@@ -33,7 +33,12 @@ def test_a_model_is_written_and_a_table_of_how_it_went(facert, take, model):
     done = facert("train", take, "-o", model)
     assert done.code == 0
     assert "auto in " in done.out
-    for word in ("unlabelled poses", "seconds", "weight of factors", "training reconstruction"):
+    for word in (
+        "unlabelled poses",
+        "training seconds",
+        "weight of factors",
+        "training reconstruction",
+    ):
         assert word in done.out
     assert api.load(model).figures["labelled frames"] == 12
     assert "warning" not in done.err

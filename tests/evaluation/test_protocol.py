@@ -162,3 +162,10 @@ def test_what_does_not_fit_together_is_refused(make, make_take):
 def test_a_protocol_checks_itself(options):
     with pytest.raises(InputError, match=next(iter(options))):
         Protocol(**options)
+
+
+def test_one_pose_is_left_for_the_test(make, make_take):
+    problem = make(make_take(frames=120, posed=15, animation=0))
+    assert len(draw(problem, 14, 100, 0).test) == 1
+    with pytest.raises(InputError, match="at most 14 labels: one pose is needed for the test"):
+        draw(problem, 15, 100, 0)

@@ -1,6 +1,7 @@
 import json
 import logging
 from dataclasses import replace
+from pathlib import Path
 
 import ezc3d
 import numpy as np
@@ -161,3 +162,19 @@ def test_an_output_is_refused_before_any_work(tmp_path):
     with pytest.raises(InputError, match=r"\.livelink\.csv, \.csv, \.json, found '\.glb'"):
         formats.require_take_output(tmp_path / "a.glb", overwrite=True)
     formats.require_take_output(tmp_path / "there.h5", overwrite=True)
+
+
+@pytest.mark.parametrize("name", ["take.h5", "take.csv", "take.json"])
+def test_a_target_of_a_take_that_has_no_targets_is_refused(tmp_path, name):
+    path = tmp_path / name
+    formats.write_take_file(TAKE, path)
+    for read in (formats.read_take_file, formats.read_source_file):
+        with pytest.raises(InputError, match=r"take\.\w+: --target: expected .* Leave it out"):
+            read(path, "nonsense")
+
+
+def test_of_several_takes_those_get_the_target_that_can_have_one():
+    track, take = Path("truth.npz"), Path("take.h5")
+    assert formats.targets_for("mine", take, track, None) == [None, "mine", None]
+    assert formats.targets_for("mine", take, take) == ["mine", "mine"]  # reading refuses it
+    assert formats.targets_for(None, take, track) == [None, None]

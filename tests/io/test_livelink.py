@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from facert.data import Controls, Source, Take
 from facert.errors import InputError
+from facert.io.formats import read_take_file
 from facert.io.livelink import (
     format_timecode,
     parse_timecode,
@@ -262,3 +263,12 @@ def test_a_start_whose_frames_are_beyond_the_rate_is_in_sixtieths(make_take, tmp
     )
     write_livelink(take, tmp_path / "b.livelink.csv")
     assert (tmp_path / "b.livelink.csv").read_text().splitlines()[1].startswith("00:00:10:59.000,")
+
+
+def test_a_recording_that_a_spreadsheet_saved_with_semicolons_is_read(tmp_path):
+    path = tmp_path / "face.csv"
+    header = "Timecode;BlendShapeCount;JawOpen\n"
+    path.write_text(f"{header}01:00:00:00.000;1;0,25\n01:00:00:02.000;1;0,5\n")
+    take = read_take_file(path)
+    assert take.source.names == ("jawOpen",)
+    np.testing.assert_array_equal(take.source.values[:, 0], [0.25, 0.5])

@@ -39,3 +39,11 @@ def test_frames_have_whole_numbers(tmp_path: Path, number: str) -> None:
     path.write_text(f"frame,jaw\n0,0.5\n{number},0.1\n")
     with pytest.raises(InputError, match=r"poses\.csv: line 3, column frame"):
         read_poses(path)
+
+
+def test_a_table_with_semicolons_and_decimal_commas_names_frames(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    path.write_text("frame;jaw;smile\n12;0,1;0,2\n4;0;1\n")
+    poses = read_poses(path)
+    np.testing.assert_array_equal(poses.frames, [12, 4])
+    np.testing.assert_array_equal(poses.values, [[0.1, 0.2], [0, 1]])

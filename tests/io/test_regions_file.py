@@ -34,7 +34,7 @@ def test_long_lists_fit_a_terminal():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[brows\n", "expected TOML"),
+        ("[brows\n", r"expected TOML such as \[brows\] with markers = .* and controls = "),
         ("brows = 3", r"regions\.toml: regions: expected a table a region"),
         ("[brows]\nmarkers = ['a']", r"regions\.toml: regions\.brows\.controls: expected at least"),
     ],

@@ -88,3 +88,23 @@ def test_a_source_comes_back(tmp_path_factory, values, as_markers):
     read = read_table(path)
     assert read.source.names == tuple(names)
     np.testing.assert_allclose(read.source.values, values, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("separator", "comma"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]
+)
+def test_tables_as_any_spreadsheet_exports_them(path, separator, comma):
+    rows = [["time", "smile", "frown"], ["0", "0.5", "-1.5e-3"], ["0.5", "", ".25"]]
+    lines = [separator.join(cell.replace(".", comma) for cell in row) for row in rows]
+    path.write_text("\n".join(lines))
+    take = read_table(path)
+    assert take.source.names == ("smile", "frown")
+    np.testing.assert_array_equal(take.time, [0, 0.5])
+    np.testing.assert_array_equal(take.source.values, [[0.5, -0.0015], [np.nan, 0.25]])
+
+
+@pytest.mark.parametrize("row", ["0,5;1.5", "0.5;1,234", "0;1.234,5"])
+def test_a_comma_that_may_part_thousands_is_not_guessed(path, row):
+    path.write_text(f"time;smile\n{row}\n")
+    with pytest.raises(InputError, match=r"line 2, column .* expected a number"):
+        read_table(path)

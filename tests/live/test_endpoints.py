@@ -58,6 +58,19 @@ def test_what_is_not_understood_is_named(parse, text):
         parse(text)
 
 
+def test_the_example_in_the_message_is_one_that_is_understood():
+    for parse in (parse_input, parse_output):
+        with pytest.raises(ValueError, match="as in") as caught:
+            parse("vmx")
+        example = str(caught.value).rpartition(" ")[2]
+        assert str(parse(example)).endswith(example.partition(":")[2])
+
+
+@pytest.mark.parametrize("text", ["vmc:127.0.0.1:39539", "vmc:[::1]:39539"])
+def test_an_address_is_written_as_it_is_given(text):
+    assert str(parse_output(text)) == text
+
+
 def test_an_unknown_host_is_an_error_before_the_show():
     with pytest.raises(InputError, match="a host that is known"):
         open_sender(Address("vmc", "nowhere.invalid", 1), ("jaw",), Counters())

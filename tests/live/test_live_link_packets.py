@@ -1,3 +1,4 @@
+import logging
 import struct
 
 import numpy as np
@@ -64,6 +65,24 @@ def test_controls_are_matched_in_any_spelling_and_others_are_told_about(caplog):
     assert (values.pop("eyeBlinkLeft"), values.pop("jawOpen")) == (0.5, 0.25)
     assert not any(values.values())
     assert "hornTwist" in caplog.text
+
+
+def test_a_shape_that_is_one_in_arkit_gets_the_mean_of_its_halves(caplog):
+    caplog.set_level(logging.INFO)
+    names = ["browInnerUp_L", "cheek-puff-right", "eyeBlink_L", "brow_inner_up_R", "CheekPuffLeft"]
+    raw = packet(np.array([0.5, 0.25, 0.125, 1.0, 0.0]), names=names)
+    values = dict(zip(PACKET_NAMES, decoded(raw).values, strict=True))
+    found = {name: value for name, value in values.items() if value}
+    assert found == {"browInnerUp": 0.75, "cheekPuff": 0.125, "eyeBlinkLeft": 0.125}
+    assert "the mean of the left and the right browInnerUp, cheekPuff" in caplog.text
+    assert "no place" not in caplog.text
+
+
+def test_half_a_shape_without_its_other_half_is_not_sent_nor_halves_beside_the_whole(caplog):
+    names = ["cheekPuff_L", "browInnerUp", "browInnerUp_L", "browInnerUp_R"]
+    values = decoded(packet(np.array([0.5, 0.25, 1.0, 1.0]), names=names)).values
+    assert values.sum() == values[PACKET_NAMES.index("browInnerUp")] == 0.25
+    assert "no place for cheekPuff_L, browInnerUp_L, browInnerUp_R" in caplog.text
 
 
 def test_a_character_without_any_shape_of_arkit_cannot_be_sent():

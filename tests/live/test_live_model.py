@@ -180,3 +180,17 @@ def test_a_new_model_knows_the_actor_at_rest_as_well(path, take, models, caplog)
     stream = facert.load(models / "second.safetensors").stream(take.source.names, take.fps)
     np.testing.assert_allclose(said, stream.step(neutral).params, atol=1e-9)
     assert np.abs(said - stream.step(neutral + 1.0).params).max() > 0.05
+
+
+def test_a_new_model_goes_on_at_the_rate_that_was_measured(models, path, take):
+    """Also one that was read before the rate was known."""
+    like = frame_pattern(take.source.names, "markers", take.units)
+    file = ModelFile(path)
+    model = LiveModel(file, file.load(), like)
+    early = model._prepare(facert.load(models / "second.safetensors"))
+    for number, frame in enumerate(frames(take)[:70]):
+        model.step(replace(frame, time=number / 120.0))
+    model._next = early
+    model.step(frames(take)[70])
+    assert model.retargeter.settings.method == "nearest"
+    assert model._loaded.fps == pytest.approx(120.0)

@@ -1,3 +1,4 @@
+import logging
 import socket
 import time
 from dataclasses import replace
@@ -10,7 +11,7 @@ from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import frame_pattern
 from facert.live.livelink import PACKET_NAMES
 from facert.live.osc import message
-from facert.live.receivers import TakeReceiver
+from facert.live.receivers import TOLD, TakeReceiver
 from facert.names import ARKIT_NAMES
 
 
@@ -54,6 +55,17 @@ def test_malformed_truncated_and_repeated_packets_change_nothing_but_a_counter(
         assert not receiver.wait(5.0)
     assert (receiver.counters.bad, receiver.counters.late) == (80, 80)
     assert receiver.counters.received == 40
+
+
+def test_the_first_bad_packets_are_told_about_with_reason_and_sender(receiver, phone, caplog):
+    caplog.set_level(logging.DEBUG, "facert")
+    for _ in range(100):
+        phone.send(b"no face")
+    while receiver.counters.bad < 100:
+        receiver.wait(5.0)
+    said = "bad packet of 7 bytes from 127.0.0.1: not Live Link Face"
+    assert caplog.text.count(said) == TOLD
+    assert caplog.text.count("only counted") == 1
 
 
 def test_a_flood_does_not_keep_the_receiver_from_answering(receiver, phone):

@@ -37,10 +37,29 @@ def test_each_pose_arrives_with_its_time(listener):
         assert found == pytest.approx(expected)
 
 
-def test_that_nobody_listens_is_no_error(listener):
+def test_that_nobody_listens_is_counted_and_told_about_once(listener, caplog):
     port = listener.getsockname()[1]
     listener.close()
-    assert send(port, *[[0.5, 0.5]] * 20).unsent == 0
+    counters = send(port, *[[0.5, 0.5]] * 20)
+    assert counters.unsent == 0
+    assert 0 < counters.unheard < 20
+    assert caplog.text.count(f"nobody listens on 127.0.0.1:{port}") == 1
+
+
+def test_who_listens_later_misses_nothing_from_then_on(listener):
+    address = listener.getsockname()
+    listener.close()
+    sender = open_sender(Address("osc", *address), ("jaw",), Counters())
+    pose = Streamed(np.zeros(1), lambda: (None, np.zeros(0)))
+    sender.send(Frame(0.0, np.zeros(1), 0.0), pose)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
+        late.bind(address)
+        late.settimeout(20.0)
+        for time in (1.0, 2.0):
+            sender.send(Frame(time, np.zeros(1), 0.0), pose)
+        for time in (1.0, 2.0):
+            assert parse(late.recv(4096))[-1].numbers == (time,)
+    sender.close()
 
 
 def test_what_the_system_will_not_send_is_counted_and_told_about_once(caplog):

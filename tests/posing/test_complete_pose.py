@@ -52,7 +52,9 @@ def test_poses_become_a_take_that_can_be_read_again(trained, tmp_path):
     assert again.source.names == ("jawOpen",)
 
 
-def test_a_retargeted_frame_is_corrected(trained, take):
+@pytest.fixture(scope="module")
+def start(trained, take):
+    """The first frame, retargeted."""
     one = replace(
         take,
         time=take.time[:1],
@@ -60,13 +62,39 @@ def test_a_retargeted_frame_is_corrected(trained, take):
         params=None,
         animation=None,
     )
-    start = trained.retarget(one)
+    return trained.retarget(one)
+
+
+def test_a_retargeted_frame_is_corrected(trained, take, start):
     same = facert.complete_pose(trained, {"jawOpen": start.params[0, 0]}, start=start)
     np.testing.assert_allclose(same.pose, start.params[0], atol=1e-9)
     other = facert.complete_pose(trained, {"jawOpen": start.params[0, 0] + 0.1}, start=start)
     assert (np.abs(other.pose - start.params[0]) > 1e-6).sum() > 1
     with pytest.raises(InputError, match="start: expected one frame"):
         facert.complete_pose(trained, {"jawOpen": 0.1}, start=trained.retarget(take))
+
+
+def test_controls_are_held_by_name_or_pattern_unless_they_are_set(trained, start):
+    before = start.params[0]
+    given = {"jawOpen": before[0] + 0.1}
+    for hold in (["*S*", "jaw*"], ["mouth-smile-left"]):
+        done = facert.complete_pose(trained, given, start=start, hold=hold)
+        assert done.held == ("mouthSmile_L",)
+        assert done.as_dict["held"] == ["mouthSmile_L"]
+        assert done.pose[1] == before[1]
+        assert done.pose[0] == given["jawOpen"]
+    with pytest.raises(InputError, match="Did you mean 'browInnerUp'"):
+        facert.complete_pose(trained, given, start=start, hold=["browInner"])
+    with pytest.raises(InputError, match="a pattern that some fit, found 'eye"):
+        facert.complete_pose(trained, given, start=start, hold=["eye*"])
+    with pytest.raises(InputError, match="--from"):
+        facert.complete_pose(trained, given, hold=["mouth*"])
+
+
+@pytest.mark.parametrize("corrected", [False, True])
+def test_values_far_from_every_known_pose_are_told(trained, start, caplog, corrected):
+    facert.complete_pose(trained, {"jawOpen": 9.0}, start=start if corrected else None)
+    assert "no known pose comes near" in caplog.text
 
 
 @pytest.mark.parametrize(

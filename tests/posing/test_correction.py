@@ -73,3 +73,29 @@ def test_samples_spread_as_is_told(world):
     posed = corrected(known, said[0], said[0, G] + 0.2, std=np.full(P, 0.3), samples=4000)
     assert (posed.samples[:, G] == posed.pose[G]).all()
     np.testing.assert_allclose(posed.samples.std(axis=0), posed.std, rtol=0.1, atol=1e-12)
+
+
+def held(known, start, values, held, soft=0.0):
+    rng = np.random.default_rng(0)
+    return correct(start, None, known, Given(G, values, soft), 5, rng, np.array(held))
+
+
+def test_what_is_held_stays_and_the_others_follow(world):
+    known, _, said = world
+    free = corrected(known, said[0], said[0, G] + 0.3)
+    for soft in (0.0, 0.1):
+        done = held(known, said[0], said[0, G] + 0.3, [1, 4], soft)
+        assert (done.pose[[1, 4]] == said[0, [1, 4]]).all()
+        assert (done.samples[:, [1, 4]] == said[0, [1, 4]]).all()
+        assert (done.std[[1, 4]] == 0.0).all()
+        assert (np.abs(done.pose - said[0])[[2, 5]] > 1e-3).all()
+    assert (np.abs(free.pose - said[0])[[1, 4]] > 1e-3).all()
+
+
+def test_what_is_held_makes_nothing_of_the_others_more_certain(world):
+    known, _, said = world
+    free = corrected(known, said[0], said[0, G] + 0.3)
+    done = held(known, said[0], said[0, G] + 0.3, [1, 4])
+    others = [0, 2, 3, 5]
+    np.testing.assert_array_equal(done.pose[others], free.pose[others])
+    np.testing.assert_array_equal(done.std[others], free.std[others])

@@ -228,3 +228,13 @@ def test_a_damaged_model_is_refused(trained):
     del arrays["layout.weights"]
     with pytest.raises(InputError, match=r"layout\.weights"):
         Regional(settings).load(arrays)
+
+
+def test_errors_of_the_regions_are_told_in_the_units_of_the_controls(take, trained):
+    percent = replace(take, params=100.0 * take.params, animation=100.0 * take.animation)
+    by_percent = facert.train(percent, Settings(method="auto", regions=TWO, **QUICK)).figures
+    figures = trained("auto").figures
+    told = [name for name in figures if "error at poses left out" in name]
+    assert [name.split(":")[0] for name in told] == ["lower", "upper"]
+    for name in told:
+        assert by_percent[name] == pytest.approx(100.0 * figures[name], rel=1e-6)

@@ -17,7 +17,7 @@ from facert.errors import InputError
 from facert.evaluation.summary import Row
 from facert.report.evaluation import read_evaluation
 from facert.report.page import make_report, to_html
-from facert.report.performance import fits, is_truth_of, performance_section
+from facert.report.performance import fits, performance_section, truth_among
 from facert.report.sections import Fact, Section, Table
 
 HOSTILE = '<script>alert("1")</script>'
@@ -171,9 +171,9 @@ def test_errors_are_told_by_region_and_in_all(performance) -> None:
 
 def test_truth_and_rig_are_known_by_what_they_hold(performance, make_take) -> None:
     result, truth, rig = performance
-    assert is_truth_of(truth, result)
-    assert not is_truth_of(result, truth)
-    assert not is_truth_of(make_take(posed=60), result)
+    near = replace(truth, controls=Controls(("a", *CONTROLS[1:])))
+    assert truth_among([near, truth], result) is truth
+    assert truth_among([result, make_take(posed=60)], result) is None
     assert fits(rig, result)
     assert not fits(rig, make_take())
     with pytest.raises(InputError, match="--truth"):
@@ -186,3 +186,35 @@ def test_what_is_empty_leaves_no_trace() -> None:
     assert "<dl>" not in text
     assert "<nav>" not in text
     assert "<dl>" in to_html(make_report("a", (Section("b", facts=(Fact("c", "d"),)),)))
+
+
+def test_several_results_are_compared_first_by_part_of_the_face(make_take) -> None:
+    names = ("jawOpen", "browInnerUp", "cheekPuff", "mouthSmileLeft")
+    truth = replace(make_take(posed=60), controls=Controls(names))
+    results = [replace(truth, params=truth.params + off) for off in (0.2, 0.1)]
+    sections = tuple(
+        performance_section(name, result, truth=truth)
+        for name, result in zip("ab", results, strict=True)
+    )
+    first, *others = make_report("c", sections).sections
+    assert tuple(others) == sections
+    (table,) = first.tables
+    assert table.columns == (
+        "result", "frames", "controls", "brows", "cheeks", "mouth", "jaw", "all"
+    )  # fmt: skip
+    assert table.rows[1] == ("b", "60", "4", *5 * ("0.1000",))
+    assert table.best == {1}
+    assert make_report("c", sections[:1]).sections == sections[:1]
+
+
+def test_a_truth_with_other_controls_is_compared_in_those_that_are_shared(performance) -> None:
+    result, truth, rig = performance
+    known = replace(truth, controls=Controls(("a", *CONTROLS[1:])))
+    section = performance_section("a", result, rig, known)
+    assert section.tables[0].rows[-1] == ("all", "3", "0.1000")
+    assert section.text.endswith("not compared: a (only in the truth); $x (only in the result)")
+    assert truth_among([known], result) is known
+    other = replace(truth, controls=Controls(("a", "b", "c", CONTROLS[3])))
+    assert truth_among([other], result) is None
+    with pytest.raises(InputError, match="poses of some of the take's controls, found none"):
+        performance_section("a", result, truth=replace(truth, controls=Controls(tuple("abcd"))))

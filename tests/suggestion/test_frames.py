@@ -133,6 +133,18 @@ def test_a_model_is_asked_where_it_is_uncertain(take: Take) -> None:
     assert std[chosen].mean() > std.mean()
 
 
+def test_what_a_model_learned_from_is_not_suggested_again_though_the_take_does_not_say_it(
+    take: Take, tmp_path
+) -> None:
+    """The recording goes on as it came from the camera; the labels are in another file."""
+    model = facert.train(take, facert.Settings(method="gpr"))
+    model.save(tmp_path / "model.safetensors")
+    bare = replace(take, params=None, controls=None, animation=None)
+    chosen = frames(bare, COUNT, have=facert.load(tmp_path / "model.safetensors"))
+    assert not set(chosen) & set(take.labels.tolist())
+    np.testing.assert_array_equal(chosen, frames(bare, COUNT, have=model))
+
+
 def test_a_model_must_tell_how_certain_it_is(take: Take) -> None:
     model = facert.train(take, facert.Settings(method="ridge"))
     with pytest.raises(InputError, match="found ridge"):

@@ -24,7 +24,7 @@ def character(take, names=None):
 
 def test_poses_of_the_keys_make_all_poses(take):
     keys = range(0, 60, 6)
-    result = propagate_poses(take, keys)
+    result = propagate_poses(take, keys, Propagation(limits="none"))
     np.testing.assert_allclose(result.params[::6], take.params[::6], atol=1e-9)
     assert np.sqrt(np.mean((result.params - take.params) ** 2)) < 0.1 * take.params.std()
 
@@ -41,6 +41,24 @@ def test_poses_stay_within_declared_limits(take):
     controls = Controls(take.controls.names, [[-0.05, 0.05]] * 4)
     result = propagate_poses(replace(take, controls=controls), range(0, 60, 6))
     assert np.abs(result.params).max() == pytest.approx(0.05)
+
+
+def test_poses_stay_within_what_is_known_unless_told(take):
+    keys = [10, 25, 40, 55]
+    free = propagate_poses(take, keys, Propagation(limits="none")).params
+    low, high = take.params[keys].min(axis=0), take.params[keys].max(axis=0)
+    assert ((free < low) | (free > high)).any()
+    np.testing.assert_array_equal(propagate_poses(take, keys).params, np.clip(free, low, high))
+    declared = propagate_poses(take, keys, Propagation(limits="declared"))
+    np.testing.assert_array_equal(declared.params, free)  # none are
+
+
+def test_old_animation_tells_the_range_too(take):
+    keys = [10, 25, 40, 55]
+    animation = np.vstack([take.params[keys], [[-9.0] * 4, [9.0] * 4]])
+    free = propagate_poses(take, keys, Propagation(limits="none"))
+    found = propagate_poses(replace(take, animation=animation), keys)
+    np.testing.assert_array_equal(found.params, free.params)
 
 
 def test_feature_points_follow_the_marker_of_their_name(take):

@@ -1,0 +1,86 @@
+"""Two takes cut down to the controls that both have, so that they can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from facert.data import Controls, Take
+from facert.names import NameIndex
+
+
+@dataclass(frozen=True, eq=False)
+class SharedControls:
+    """A truth and a result with the same controls, in the order and spelling of the result.
+
+    Parameters
+    ----------
+    truth, result : Take
+    of_truth, of_result : tuple of str
+        The controls that only one of them has: they are left out.
+    """
+
+    truth: Take
+    result: Take
+    of_truth: tuple[str, ...] = ()
+    of_result: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the controls that both have."""
+        assert self.result.controls is not None
+        return self.result.controls.names
+
+    @property
+    def told(self) -> str:
+        """What is left out, in a line; empty where nothing is."""
+        parts = [
+            f"{', '.join(names)} (only in {where})"
+            for names, where in ((self.of_truth, "the truth"), (self.of_result, "the result"))
+            if names
+        ]
+        return f"not compared: {'; '.join(parts)}" if parts else ""
+
+
+def shared_controls(truth: Take, result: Take) -> SharedControls | None:
+    """What two takes have in common by the names of their controls, in any spelling.
+
+    Returns
+    -------
+    SharedControls or None
+        None where one has no poses, or no control has the same name.
+    """
+    if truth.controls is None or truth.params is None:
+        return None
+    if result.controls is None or result.params is None:
+        return None
+    ours, theirs = result.controls.names, truth.controls.names
+    pairs = _pairs(ours, theirs)
+    if not pairs:
+        return None
+    names = tuple(ours[i] for i, _ in pairs)
+    of_ours, of_theirs = ([pair[side] for pair in pairs] for side in (0, 1))
+    return SharedControls(
+        _cut(truth, of_theirs, names),
+        _cut(result, of_ours, names),
+        _others(theirs, of_theirs),
+        _others(ours, of_ours),
+    )
+
+
+def _pairs(ours: tuple[str, ...], theirs: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Where each shared name stands in both; each finds the other, so that none stands for two."""
+    here, there = NameIndex(ours), NameIndex(theirs)
+    found = ((i, there.find(name)) for i, name in enumerate(ours))
+    return [(i, j) for i, j in found if j is not None and here.find(theirs[j]) == i]
+
+
+def _cut(take: Take, columns: list[int], names: tuple[str, ...]) -> Take:
+    """The take with some of its controls, under these names."""
+    assert take.params is not None
+    std = None if take.std is None else take.std[:, columns]
+    params = take.params[:, columns]
+    return replace(take, controls=Controls(names), params=params, std=std, animation=None)
+
+
+def _others(names: tuple[str, ...], shared: list[int]) -> tuple[str, ...]:
+    return tuple(name for index, name in enumerate(names) if index not in set(shared))
