@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from facert.data import Controls, FloatArray, Source, Take
 from facert.errors import InputError
 from facert.gplvm.noise import with_noise
 from facert.methods import method_class
-from facert.methods.base import IN_TARGET_UNITS, Labelled, Report, Unlabelled
+from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
 from facert.neutral import at_rest, most_neutral
 from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
@@ -74,45 +74,94 @@ def train(
     neutral = _neutral(take, data, settings)
     complete = _complete_frames(take.source, data)
     given, settings = settings, with_noise(settings, source_units.apply(complete))
-    poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
-    target_units = Normalisation.of(poses, "/target/params")
-    labelled = Labelled(source_units.apply(data.X_labelled), target_units.apply(data.Y_labelled))
-    bounds = _bounds(take, data.Y_labelled, settings.limits)
-    unlabelled = Unlabelled(
-        source_units.apply(data.X_unlabelled),
-        target_units.apply(data.Y_unlabelled),
-        target_units.apply(_unlimited(controls) if bounds is None else bounds.T),
-    )
-    face = FaceData(prepared.measured, controls, poses, data.X_labelled, complete)
+    known = _normalised(take, data, source_units, settings.limits)
+    face = FaceData(prepared.measured, controls, known.poses, data.X_labelled, complete)
     method = method_for(settings, given, face)
     if start is not None and method_class(settings.method).stepwise:
-        other = _differs(start, settings, take, controls)
-        if other is None:
-            method.begin_at(
-                start.method,
-                source_units.seen_from(start.source_units),
-                target_units.seen_from(start.target_units),
-            )
-        else:
-            log.warning("training begins anew: the start has another %s", other)
+        _begin(method, start, _differs(start, settings, take, controls), source_units, known.units)
     began = time.perf_counter()
-    report = method.fit(labelled, unlabelled, monitor or Monitor())
+    report = method.fit(known.labelled, known.unlabelled, monitor or Monitor())
     seconds = time.perf_counter() - began
-    warn_if_constant(method, np.vstack([labelled.X, unlabelled.X]), labelled.Y)
+    warn_if_constant(method, known.frames, known.labelled.Y)
     return Retargeter(
         method=method,
         layout=SourceLayout(take.source.kind, take.source.names),
         units=take.units,
         controls=controls,
-        bounds=bounds,
+        bounds=known.bounds,
         source_units=source_units,
-        target_units=target_units,
+        target_units=known.units,
         figures=_noise_figures(prepared, take.units)
-        | _figures(report, seconds, labelled, target_units),
+        | _figures(report, seconds, known.labelled, known.units),
         neutral=neutral,
         motion=prepared.motion,
         labelled=data.X_labelled,
         poses=keep(data.Y_labelled, take.animation, settings.seed),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What a method is given, in normalised units, and what says which these are.
+
+    Parameters
+    ----------
+    labelled, unlabelled : Labelled, Unlabelled
+    poses : array, shape (n, P)
+        All that are known, labels first, in the controls' units.
+    bounds : array, shape (P, 2), or None
+        What poses are clipped to, in these units.
+    units : Normalisation
+        Of the poses.
+    """
+
+    labelled: Labelled
+    unlabelled: Unlabelled
+    poses: FloatArray
+    bounds: FloatArray | None
+    units: Normalisation
+
+    @property
+    def frames(self) -> FloatArray:
+        """All frames, (n, d_x)."""
+        return np.vstack([self.labelled.X, self.unlabelled.X])
+
+
+def _normalised(
+    take: Take, data: TrainingSet, source_units: Normalisation, limits: LimitRule
+) -> _Known:
+    poses = np.vstack([data.Y_labelled, data.Y_unlabelled])
+    units = Normalisation.of(poses, "/target/params")
+    bounds = _bounds(take, data.Y_labelled, limits)
+    unlimited = np.outer([-np.inf, np.inf], np.ones(poses.shape[1]))
+    return _Known(
+        Labelled(source_units.apply(data.X_labelled), units.apply(data.Y_labelled)),
+        Unlabelled(
+            source_units.apply(data.X_unlabelled),
+            units.apply(data.Y_unlabelled),
+            units.apply(unlimited if bounds is None else bounds.T),
+        ),
+        poses,
+        bounds,
+        units,
+    )
+
+
+def _begin(
+    method: Method,
+    start: Retargeter,
+    other: str | None,
+    source_units: Normalisation,
+    target_units: Normalisation,
+) -> None:
+    """Let a method begin at a model, in other units, unless something keeps it from that."""
+    if other is not None:
+        log.warning("training begins anew: the start has another %s", other)
+        return
+    method.begin_at(
+        start.method,
+        source_units.seen_from(start.source_units),
+        target_units.seen_from(start.target_units),
     )
 
 
@@ -153,11 +202,6 @@ def _bounds(take: Take, labelled: FloatArray, rule: LimitRule) -> FloatArray | N
         return declared
     poses = labelled if take.animation is None else np.vstack([labelled, take.animation])
     return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
-
-
-def _unlimited(controls: Controls) -> FloatArray:
-    """Bounds (2, P) that hold nothing back."""
-    return np.outer([-np.inf, np.inf], np.ones(len(controls.names)))
 
 
 def _complete_frames(source: Source, data: TrainingSet) -> FloatArray:
