@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from facert.data import Controls, Take
+from facert.errors import InputError
 from facert.names import NameIndex
+from facert.wording import plural
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,22 @@ def shared_controls(truth: Take, result: Take) -> SharedControls | None:
         _others(theirs, of_theirs),
         _others(ours, of_ours),
     )
+
+
+def require_shared(truth: Take, result: Take, fix: str) -> SharedControls:
+    """What a result has in common with its truth.
+
+    Raises
+    ------
+    InputError
+        With this fix: when it is no truth of the result, by its frames or its controls.
+    """
+    if len(truth) != len(result):
+        raise InputError("--truth", plural(len(result), "frame"), f"{len(truth)}", fix)
+    shared = shared_controls(truth, result)
+    if shared is None or not len(shared.truth.labels):
+        raise InputError("--truth", "poses of some of the take's controls", "none", fix)
+    return shared
 
 
 def _pairs(ours: tuple[str, ...], theirs: tuple[str, ...]) -> list[tuple[int, int]]:

@@ -51,7 +51,7 @@ class Asked:
         unlabelled = self.unlabelled or (default_unlabelled(problem),)
         labels = self.labels or default_labels(problem, max(unlabelled))
         posed = len(problem.take.labels)
-        if posed < MANY and None in (self.labels, self.unlabelled):
+        if max(labels) < posed < MANY and None in (self.labels, self.unlabelled):
             others = f"{plural(max(unlabelled), 'frame')} without a pose"
             numbers = " or ".join(map(str, labels))
             told = "learns from %s of %d posed frames and %s, tests on the rest"

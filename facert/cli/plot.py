@@ -53,14 +53,10 @@ def command(
 
 def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:
     """Both with the controls that they share, in the spelling of the take."""
-    from facert.shared_controls import shared_controls
+    from facert.shared_controls import require_shared
 
     fix = "Give the truth of this take, or choose another --target."
-    if len(truth) != len(take):
-        raise InputError("--truth", plural(len(take), "frame"), f"{len(truth)}", fix)
-    shared = shared_controls(truth, take)
-    if shared is None or not len(shared.truth.labels):
-        raise InputError("--truth", "poses of some of the take's controls", "none", fix)
+    shared = require_shared(truth, take, fix)
     lacking = [name for name in names if name in shared.of_result]
     if lacking:
         found = f"none among its {plural(len(shared.names + shared.of_truth), 'control')}"

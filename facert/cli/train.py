@@ -144,7 +144,7 @@ def command(
     begin = None if start is None else facert.load(start)
     settings = _settings(begin, config, options)
     stepwise = method_class(settings.method).stepwise and settings.regions is None
-    _warn_of_idle_settings(settings)
+    _warn_of_idle_settings(settings, DEFAULTS if begin is None else begin.settings)
     if not stepwise:
         idle: dict[str, object] = {"--resume": resume, "--log": curve}
         if not method_class(settings.method).stepwise:
@@ -200,11 +200,11 @@ def _check_regions(given: str | None, regions: Regions | str | None, take: Take)
             regions.matched(take.source.names, take.controls.names)
 
 
-def _warn_of_idle_settings(settings: Settings) -> None:
-    """Say which settings are the shared models' alone where another method learns."""
+def _warn_of_idle_settings(settings: Settings, unasked: Settings) -> None:
+    """Say which settings that somebody chose are the shared models' alone, if another learns."""
     from facert.methods import method_class
 
-    idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(DEFAULTS, name)]
+    idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(unasked, name)]
     if idle and not method_class(settings.method).stepwise:
         told = "%s does not use %s: settings of the shared models, sgplvm and ssgplvm"
         console.log.warning(told, settings.method, ", ".join(idle))

@@ -112,7 +112,7 @@ class Regression(ABC):
         DeviceError
             When the settings ask for a device that is not there.
         """
-        self.on(self.settings.device)
+        self._stay_on_cpu(self.settings.device, "trains")
         count = len(labelled.X)
         if count < self.least_labels:
             raise InputError(
@@ -151,9 +151,13 @@ class Regression(ABC):
 
     def on(self, device: str) -> Self:
         """The method itself: on the CPU it is soon done. See `Method.on`."""
-        if device != "cpu" and find_device(device).type != "cpu":  # the second imports torch
-            log.warning("%s stays on the CPU: %s is not used", self.settings.method, device)
+        self._stay_on_cpu(device, "maps")
         return self
+
+    def _stay_on_cpu(self, device: str, does: str) -> None:
+        """Say so where another device was asked for, which must be there nonetheless."""
+        if device != "cpu" and find_device(device).type != "cpu":  # the second imports torch
+            log.warning("%s %s on the CPU: %s is not used", self.settings.method, does, device)
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other; none remembers those before."""

@@ -11,7 +11,7 @@ from facert.metrics import Comparison, compare
 from facert.names import shape_drivers
 from facert.report.pictures import embedded
 from facert.report.sections import Fact, Picture, Section, Table
-from facert.shared_controls import SharedControls, shared_controls
+from facert.shared_controls import SharedControls, require_shared, shared_controls
 from facert.view.faces import choose_frames, posed_face, require_poses
 from facert.view.plots import plot_controls
 from facert.view.render import render_sheet
@@ -42,7 +42,7 @@ def performance_section(
         When the take has no poses, or rig or truth do not fit it.
     """
     poses = require_poses(take)
-    shared = None if truth is None else _shared(truth, take)
+    shared = None if truth is None else require_shared(truth, take, "Give the truth of this take.")
     pictures: list[Picture] = []
     if rig is not None:
         faces = [posed_face(take, rig, "character")]
@@ -84,16 +84,6 @@ def truth_among(known: Sequence[Take], take: Take) -> Take | None:
         if shared is not None and len(shared.of_result) <= len(shared.names)
     ]
     return min(lacking, key=lambda each: each[:2])[2] if lacking else None
-
-
-def _shared(truth: Take, take: Take) -> SharedControls:
-    fix = "Give the truth of this take."
-    if len(truth) != len(take):
-        raise InputError("--truth", plural(len(take), "frame"), f"{len(truth)}", fix)
-    shared = shared_controls(truth, take)
-    if shared is None or not len(shared.truth.labels):
-        raise InputError("--truth", "poses of some of the take's controls", "none", fix)
-    return shared
 
 
 def _with_errors(section: Section, shared: SharedControls) -> Section:

@@ -375,3 +375,4 @@ def test_for_a_method_that_learns_in_one_go_a_start_is_idle(facert, take, model,
     done = facert("train", take, "-o", tmp_path / "b.safetensors", "--start", model)
     assert done.code == 0
     assert "ridge learns in one go: nothing to do for --start" in done.err
+    assert "does not use" not in done.err  # nobody chose what the start has filled in
