@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 import facert
 from facert.cleaning.detection import without_faults
 from facert.cleaning.stabilisation import stabilise
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.demo import acting, actor_rig, character_rig
 from facert.demo.build import ACTOR
 from facert.demo.character import CONTROLS, animate

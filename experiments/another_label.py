@@ -22,7 +22,7 @@ from experiments.grid import RESULTS
 from experiments.report import markdown, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.handling import AS_IT_IS
 from facert.methods.shared_gplvm import SOONER
 from facert.metrics import rms

@@ -26,10 +26,10 @@ from experiments.tracks import read_track
 from facert.cleaning.estimate import estimate
 from facert.cleaning.interpolation import interpolated
 from facert.cleaning.noise import capture_noise
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.normalisation import Normalisation
 from facert.gaps import Gaussian
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 
 KINDS, SHARES, NOISES = ("scattered", "bursts", "region"), (0.1, 0.2, 0.4), (0.0, 0.05, 0.1)
 BURST, PERIOD = (5, 60), (20, 90)  # frames

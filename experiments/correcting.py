@@ -22,7 +22,7 @@ from experiments.posing import PROBLEMS, RESULTS, TUNED, Row
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.posing.completion import Completion

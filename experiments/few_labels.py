@@ -24,10 +24,10 @@ from threadpoolctl import threadpool_limits
 import facert
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.handling import AS_IT_IS
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 
 
 def gpr(take: Take, frames: FloatArray) -> FloatArray:

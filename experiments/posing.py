@@ -27,12 +27,13 @@ from experiments.drawing import save
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Take
-from facert.data import FloatArray, IntArray, Source
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import Source
 from facert.gp.regression import maximise_likelihood
 from facert.gplvm.source_mapping import Observation, SourceMapping
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 from facert.posing.completion import Completion
 from facert.posing.known import KnownPoses
 from facert.posing.pose import complete_pose

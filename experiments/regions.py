@@ -30,13 +30,13 @@ from experiments.grid import KEPT, OPTICAL, RESULTS, TARGETS, kinds
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take, train
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import control_groups
+from facert.data.regions import AUTO
 from facert.evaluation.comparison import Estimate, paired_ratio
 from facert.handling import AS_IT_IS
 from facert.io.journal import Journal, source_digest
 from facert.metrics import rms
-from facert.names import control_groups
-from facert.regions.nouns import AUTO
 
 log = logging.getLogger(__name__)
 

@@ -35,11 +35,11 @@ from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.normalisation import Normalisation
 from facert.evaluation.figures import COLOURS, INK, MARKERS
 from facert.handling import AS_IT_IS, Handling
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 from facert.retargeter import Mode
 
 KINDS, SHARES, NOISES = cleaning.KINDS, (0.1, 0.2, 0.4), (0.0, 0.05, 0.1, 0.2)

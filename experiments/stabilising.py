@@ -23,7 +23,7 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Source, Take
 from facert.cleaning.stabilisation import stabilise
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.metrics import rms
 from facert.rigid import RigidMotion, align
 

@@ -23,7 +23,7 @@ from experiments.grid import OPTICAL, RESULTS, TARGETS, begin_log, kinds, log
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take, train
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.evaluation.comparison import Estimate, paired_ratio
 from facert.handling import AS_IT_IS
 from facert.metrics import rms

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from facert import Take, read_take
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 DATA = Path(os.environ.get("FACERT_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 

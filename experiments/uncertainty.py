@@ -24,7 +24,7 @@ from experiments.grid import OPTICAL, RESULTS, SPEECH, kinds
 from experiments.report import markdown, write_text
 from experiments.robustness import Cell, spoil
 from facert import Settings
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.metrics import rms
 
 NOISES = (0.0, 0.05)

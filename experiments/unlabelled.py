@@ -34,7 +34,7 @@ from experiments.grid import KEPT, RESULTS, code_of
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take
-from facert.data import IntArray
+from facert.data.arrays import IntArray
 from facert.io.journal import Journal
 from facert.metrics import rms
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.grid import DEFAULT, Case
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.evaluation.comparison import Estimate, paired_ratio
 
 

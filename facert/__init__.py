@@ -17,7 +17,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from facert.data import Controls, Rig, Source, Take
+    from facert.data.rig import Rig
+    from facert.data.take import Controls, Source, Take
     from facert.errors import FacertError, InputError
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
@@ -50,14 +51,14 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Controls": ("facert.data", "Controls"),
+    "Controls": ("facert.data.take", "Controls"),
     "FacertError": ("facert.errors", "FacertError"),
     "InputError": ("facert.errors", "InputError"),
     "Retargeter": ("facert.retargeter", "Retargeter"),
-    "Rig": ("facert.data", "Rig"),
+    "Rig": ("facert.data.take", "Rig"),
     "Settings": ("facert.settings", "Settings"),
-    "Source": ("facert.data", "Source"),
-    "Take": ("facert.data", "Take"),
+    "Source": ("facert.data.take", "Source"),
+    "Take": ("facert.data.take", "Take"),
     "complete_pose": ("facert.posing.pose", "complete_pose"),
     "load": ("facert.model_file", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),

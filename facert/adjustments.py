@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.names import fitting, instead_of
 from facert.errors import InputError
-from facert.names import fitting, instead_of
 
 LARGEST = 1e6
 """Beyond, a gain or a limit is a slip of the pen."""

@@ -13,10 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from facert.data import Controls, FloatArray, IntArray, Rig, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, folded
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
+from facert.data.text import plural
 from facert.errors import InputError
-from facert.names import NameIndex, folded
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import facert
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import read_tensors, write_tensors
 from facert.optim.base import State

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 
 ITERATIONS = 5
 RIDGE = 1e-6  # relative to the mean variance

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, IntArray, Rig, Take
-from facert.names import control_groups, shape_drivers
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import control_groups, shape_drivers
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
 
 
 def rms(errors: FloatArray) -> float:
@@ -150,7 +152,7 @@ def vertex_gram(rig: Rig, controls: Controls) -> FloatArray:
     Raises
     ------
     InputError
-        When the rig lacks a shape for one of them, see `facert.names.shape_drivers`.
+        When the rig lacks a shape for one of them, see `facert.data.names.shape_drivers`.
     """
     drivers = shape_drivers(controls.names, rig.names)
     shapes = drivers @ rig.shapes.reshape(len(rig.names), -1)

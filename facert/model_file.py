@@ -11,12 +11,13 @@ import numpy as np
 
 import facert
 from facert.cleaning.motion import Motion
-from facert.data import Controls, FloatArray, SourceKind
+from facert.data.array_group import check_axes
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import Controls, SourceKind
 from facert.errors import InputError, reading
 from facert.io.tensors import read_tensors, write_tensors
-from facert.learned import check_axes
 from facert.methods import make_method
-from facert.normalisation import Normalisation
 from facert.retargeter import Retargeter
 from facert.settings import Settings
 from facert.source_layout import SourceLayout

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, Mesh, MeshSequence, Rig
+from facert.data.arrays import FloatArray
+from facert.data.rig import Mesh, MeshSequence, Rig
 from facert.errors import InputError
 
 TOLERANCE = 5e-3  # a fifth of a millimetre where a jaw opens by four centimetres

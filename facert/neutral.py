@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, SourceKind
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import SourceKind
 from facert.errors import InputError
 
 log = logging.getLogger(__name__)

@@ -22,7 +22,8 @@ from typing import Self
 import numpy as np
 
 from facert.cleaning.motion import Motion
-from facert.data import FloatArray, SourceKind
+from facert.data.arrays import FloatArray
+from facert.data.take import SourceKind
 
 RIDGE = 0.1
 """λ: the smaller, the further posed frames are taken to reach beyond themselves."""

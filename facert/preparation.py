@@ -11,11 +11,11 @@ from facert.cleaning.detection import without_faults
 from facert.cleaning.estimate import LEAST_NOISE, Estimate, estimate_if_it_moves, largest_step
 from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
-from facert.data import Source, Take
-from facert.normalisation import Normalisation
+from facert.data.normalisation import Normalisation
+from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.settings import Settings
 from facert.training_set import MIN_OBSERVED
-from facert.wording import plural
 
 log = logging.getLogger(__name__)
 

@@ -18,12 +18,13 @@ from facert.adjustments import Adjustments
 from facert.cleaning.detection import without_faults
 from facert.cleaning.estimate import FEWEST, estimate_if_it_moves, grid
 from facert.cleaning.motion import Motion
-from facert.data import Controls, FloatArray, Source, SourceKind, Take
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import Controls, Source, SourceKind, Take
 from facert.errors import InputError, NumericalError
 from facert.handling import Handling
 from facert.methods.base import Method
 from facert.neutral import at_rest, calibrated
-from facert.normalisation import Normalisation
 from facert.novelty import WORTH_TELLING, Novelty, Shown
 from facert.settings import Settings
 from facert.source_layout import SourceLayout

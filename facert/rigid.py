@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 
 FLAT = 1e-3
 """Points lie on a line when their spread across it is below this share of the whole spread."""

@@ -6,10 +6,11 @@ import logging
 
 import numpy as np
 
-from facert.data import FloatArray, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Take
+from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.base import Method
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal, get_args, get_type_hints
 
+from facert.data.regions import AUTO, Regions
 from facert.errors import InputError
-from facert.regions.nouns import AUTO, Regions
 
 OptimiserName = Literal["lbfgs", "scg"]
 LimitRule = Literal["auto", "declared", "none"]

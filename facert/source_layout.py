@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Source, SourceKind
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, match
+from facert.data.take import Source, SourceKind
 from facert.errors import InputError
-from facert.names import NameIndex, match
 
 log = logging.getLogger(__name__)
 

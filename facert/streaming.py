@@ -12,7 +12,7 @@ from facert.adjustments import Adjustments
 from facert.cleaning.estimate import LEAST_NOISE
 from facert.cleaning.filtering import MotionFilter, NoiseMeter, Seen
 from facert.cleaning.watching import MarkerWatch
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.handling import Handling
 from facert.methods.base import Prediction

@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.ranges import parse_frames
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.gplvm.noise import with_noise
 from facert.methods import method_class
 from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
 from facert.neutral import at_rest, most_neutral
-from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.posing.known import keep
 from facert.preparation import Prepared, prepare
-from facert.ranges import parse_frames
 from facert.regions.layout import FaceData, method_for
 from facert.regions.resolution import resolved
 from facert.retargeter import Retargeter

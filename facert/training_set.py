@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.gaps import Gaussian
 from facert.settings import Settings

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.capture import farthest_vertices, simulate_capture
-from facert.data import Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.errors import InputError
 
 NAMES = ("jawOpen", "browInnerUp_L", "browInnerUp_R", "extra")

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.data import Controls, Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.metrics import compare, jitter, rms, score, vertex_errors, vertex_gram
 
 NAMES = ("jawOpen", "browDown_L", "browDown_R")

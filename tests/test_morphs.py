@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Mesh, MeshSequence, Rig
+from facert.data.rig import Mesh, MeshSequence, Rig
 from facert.errors import InputError
 from facert.morphs import Morphs, compact_morphs, rig_morphs
 

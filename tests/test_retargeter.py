@@ -10,9 +10,9 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 import facert
 from facert import Controls, InputError, Settings, Source
+from facert.data.normalisation import Normalisation
 from facert.handling import AS_IT_IS
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 from facert.training_set import choose_training_set
 
 QUICK = Settings(unlabelled=30, limits="declared")

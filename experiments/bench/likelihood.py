@@ -20,7 +20,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from experiments.bench.figure import Call, Figure, cpu_seconds
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.lapack import value_and_gradient
 from facert.gp.likelihood import compact_factor, negative_log_likelihood
 

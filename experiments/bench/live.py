@@ -33,7 +33,8 @@ import numpy as np
 
 from experiments.bench.problem import bench_take
 from facert import Settings, train
-from facert.data import FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, Take
 from facert.live.livelink import PACKET_NAMES, LiveLinkEncoder
 
 WARM = 2.0

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.bench.figure import Figure, cpu_seconds
 from experiments.bench.problem import bench_data, bench_frames
 from facert import Settings
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.methods import make_method
 from facert.methods.base import Method
 from facert.threads import threads_for

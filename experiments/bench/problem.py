@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 
 from experiments.tracks import DATA, draw, read_track
 from facert import Take
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.methods.base import Labelled, Unlabelled
-from facert.normalisation import Normalisation
 from facert.settings import Settings
 from facert.training_set import choose_training_set
 

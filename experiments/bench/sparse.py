@@ -25,13 +25,13 @@ from experiments.drawing import save
 from experiments.report import markdown, write_text
 from experiments.tracks import DATA, read_track
 from facert import Settings
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.gplvm.lle import constraint_matrix
 from facert.gplvm.module import SharedGPLVM
 from facert.gplvm.sparse_module import SparseSharedGPLVM
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
-from facert.normalisation import Normalisation
 
 FOLDER = Path(__file__).resolve().parent
 COUNTS = (50, 100, 200, 500, 1000, 2000, 4000)

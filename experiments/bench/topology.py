@@ -20,10 +20,11 @@ from scipy import sparse
 from experiments.bench.problem import describe  # and one thread
 from experiments.topology.recordings import weights_of
 from experiments.tracks import DATA
-from facert.data import FloatArray, IntArray, MeshSequence
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import shape_drivers
+from facert.data.rig import MeshSequence
 from facert.io.formats import read_rig_file
 from facert.io.mesh_sequence import write_mesh_sequence
-from facert.names import shape_drivers
 from facert.topology.alignment import alignment_matrix
 from facert.topology.driving import SURFACE, FaceDriver, smooth_energy
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings

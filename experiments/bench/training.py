@@ -13,12 +13,12 @@ from scipy.optimize import OptimizeResult, minimize
 from experiments.bench.figure import Call, Figure, cpu_seconds
 from experiments.bench.problem import bench_data
 from facert import Settings
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.gplvm.noise import with_noise
 from facert.methods import make_method
 from facert.methods.base import Labelled, Report
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
-from facert.normalisation import Normalisation
 from facert.optim.base import Result
 from facert.optim.flat import FlatObjective
 

@@ -22,7 +22,7 @@ from experiments.report import markdown, write_text
 from experiments.topology import driving, propagation
 from experiments.topology.pairs import make_pairs, make_ramps
 from experiments.topology.scores import Scores
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.topology.propagation import METHODS
 
 RESULTS = Path(__file__).resolve().parents[1] / "results" / "topology"

@@ -20,9 +20,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from experiments.tracks import DATA
-from facert.data import FloatArray, IntArray, Mesh, Rig
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, shape_drivers
+from facert.data.rig import Mesh, Rig
 from facert.io.formats import read_rig_file
-from facert.names import NameIndex, shape_drivers
 
 POINTS = 80
 LANDMARKS = slice(17, 68)  # of the usual 68; the first 17 run along the jaw

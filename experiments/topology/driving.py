@@ -19,7 +19,8 @@ from experiments.report import write_csv, write_text
 from experiments.topology.characters import POINTS, Character, farthest_points, ict, makehuman
 from experiments.topology.recordings import RECORDINGS, expressive_frames
 from experiments.topology.scores import Scores, draw_curves
-from facert.data import FloatArray, IntArray, MeshSequence
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import MeshSequence
 from facert.topology.driving import DEFAULT, METHODS, FaceDriver
 from facert.topology.suggestion import suggest_points
 from facert.view.faces import Face

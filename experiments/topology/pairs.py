@@ -31,7 +31,7 @@ from experiments.topology.recordings import (
     weights_of,
 )
 from experiments.tracks import DATA, read_track
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 EACH = 10
 RAMPS = 50

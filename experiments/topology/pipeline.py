@@ -21,7 +21,8 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.topology.characters import IDENTITIES, POINTS, Character, ict, makehuman, on_ict
 from experiments.topology.driving import vertex_rms
 from experiments.topology.recordings import RECORDINGS, SEGMENT, liveliest, weights_of
-from facert.data import FloatArray, IntArray, MeshSequence
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import MeshSequence
 from facert.topology import driving, propagation
 from facert.topology.driving import FaceDriver
 from facert.topology.keyed import KeyedPerformance

@@ -19,7 +19,7 @@ from experiments.drawing import save
 from experiments.report import markdown, write_csv, write_text
 from experiments.topology.pairs import KINDS, Pair, make_pairs
 from experiments.topology.scores import Scores, draw_curves
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import METHODS, propagate

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.tracks import read_track
 from facert import Take
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 RECORDINGS = ("rom", "utterance_a", "utterance_b")
 OPTICAL = ("optical_cheeks", "optical_eyebrows")

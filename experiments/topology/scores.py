@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from experiments.report import markdown
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.evaluation.figures import COLOURS, INK
 
 BLACK = "#000000"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.cleaning.motion import Motion
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 
 LEAST = 100
 """Numbers to compare, at least."""

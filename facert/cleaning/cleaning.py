@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.cleaning.estimate import estimate
-from facert.data import BoolArray, Take
-from facert.names import NameIndex
+from facert.data.arrays import BoolArray
+from facert.data.names import NameIndex
+from facert.data.take import Take
 
 if TYPE_CHECKING:
     from facert.handling import Handling

@@ -22,9 +22,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from facert.arrays import frozen
 from facert.cleaning.interpolation import interpolated
-from facert.data import BoolArray, FloatArray, IntArray, Source, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
+from facert.data.take import Source, Take
 from facert.gaps import Gaussian
 from facert.remembering import remembered
 

@@ -8,12 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from facert.arrays import frozen
 from facert.cleaning.calibration import error_of_filling
 from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
-from facert.data import BoolArray, FloatArray, IntArray
-from facert.normalisation import STILL, Normalisation
+from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
+from facert.data.normalisation import STILL, Normalisation
 from facert.remembering import remembered
 from facert.threads import threads_for
 

@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray
-from facert.learned import Arrays
+from facert.data.array_group import Arrays
+from facert.data.arrays import BoolArray, FloatArray
 
 ITERATIONS = 16
 COARSE, FINE = 0.1, 1e-3

@@ -21,7 +21,7 @@ from facert.cleaning.matern import transition
 from facert.cleaning.motion import LEAST_VARIANCE, Motion
 from facert.cleaning.noise import capture_noise
 from facert.cleaning.smoothing import forward_covariance
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 
 LEAST_REST = 1e-2
 """Least variance of what is left over of a column, relative to that of the noise."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import lambertw
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 SLOWEST, QUICKEST = 0.02, 4.0
 """Range of a: motion that takes some 100 frames, and hardly any memory from frame to frame."""

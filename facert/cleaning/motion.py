@@ -17,8 +17,8 @@ from facert.cleaning.factors import Factors
 from facert.cleaning.interpolation import interpolated
 from facert.cleaning.matern import QUICKEST, decay
 from facert.cleaning.smoothing import Smoothed, smooth_factors, smooth_series
-from facert.data import FloatArray, IntArray
-from facert.learned import Arrays
+from facert.data.array_group import Arrays
+from facert.data.arrays import FloatArray, IntArray
 
 FACTORS = 16
 FIT = 1000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 GAUSSIAN = 0.6744897501960817
 """Half of all draws of a standard normal variable are nearer to zero than this."""

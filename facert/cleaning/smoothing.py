@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from facert.cleaning.matern import transition
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 
 SETTLED = 1e-10
 """A covariance that changes no more than by this, relative to its variances, no longer does."""

@@ -15,9 +15,10 @@ from typing import Literal
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray, Source, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.names import match
+from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.names import match
 from facert.rigid import RigidMotion, align, determined, mean_motion
 
 log = logging.getLogger(__name__)

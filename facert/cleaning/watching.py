@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 
 HELD = 5
 """A marker that repeats its position so often, while most of the others move, is held; rounded

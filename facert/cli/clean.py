@@ -15,7 +15,7 @@ from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.cleaning.cleaning import Cleaned
-    from facert.data import Take
+    from facert.data.take import Take
     from facert.handling import Handling
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from facert.cli import console
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.take import Take
 
 
 def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.conversion import Changes, converted, in_space
-from facert.data import Rig, Take
+from facert.data.conversion import Changes, converted, in_space
+from facert.data.labelling import weights_as_poses
+from facert.data.rig import Rig
+from facert.data.take import Take
+from facert.data.text import plural
+from facert.data.units import in_metres
 from facert.errors import InputError, OutputExistsError, reading
 from facert.io import formats, usd
 from facert.io.glb import write_glb
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-from facert.labelling import weights_as_poses
 from facert.morphs import Morphs, compact_morphs, rig_morphs
-from facert.units import in_metres
 from facert.view.faces import control_settings
-from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.io.formats import Kind

@@ -15,7 +15,7 @@ from facert.cli.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
 
 if TYPE_CHECKING:
     from facert.cli.conversion import Wanted
-    from facert.conversion import Changes
+    from facert.data.conversion import Changes
 
 
 class Kind(StrEnum):
@@ -84,7 +84,7 @@ def command(
     does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
     """
     from facert.cli.conversion import ENDINGS, Wanted
-    from facert.conversion import Changes
+    from facert.data.conversion import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
 

@@ -10,10 +10,11 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES
-from facert.wording import plural
+from facert.data.text import plural
 
 if TYPE_CHECKING:
-    from facert.data import Mesh, MeshSequence, Take
+    from facert.data.rig import Mesh, MeshSequence
+    from facert.data.take import Take
     from facert.errors import InputError
 
 ENDINGS = (".h5", ".hdf5", ".glb")
@@ -82,7 +83,7 @@ def command(
 
     Points are named after their vertices, as in v1204, unless there is a map or --auto.
     """
-    from facert.data import MeshSequence
+    from facert.data.rig import MeshSequence
     from facert.errors import InputError, reading
     from facert.io.formats import read_source_file
     from facert.io.mesh import read_mesh
@@ -120,15 +121,15 @@ def _in_units(mesh: Mesh, unit: str | None) -> Mesh:
     """The mesh in the unit that its numbers are said to have."""
     from dataclasses import replace
 
-    from facert.units import checked_unit
+    from facert.data.units import checked_unit
 
     return mesh if unit is None else replace(mesh, units=checked_unit(unit, "--in-units"))
 
 
 def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) -> InputError:
     """What to do about points that lie far from the mesh, given what was asked for."""
+    from facert.data.units import in_metres
     from facert.errors import InputError
-    from facert.units import in_metres
 
     if error.field != "points":
         return error
@@ -162,10 +163,10 @@ def _require_output(output: Path, overwrite: bool) -> None:
 
 def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bool) -> str:
     """Write in the format of the name's ending; what there is to say about it."""
+    from facert.data.units import in_metres
     from facert.io.glb import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
     from facert.morphs import compact_morphs
-    from facert.units import in_metres
 
     if output.suffix.lower() != ".glb":
         write_mesh_sequence(sequence, output, overwrite)

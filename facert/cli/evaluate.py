@@ -11,12 +11,12 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import DEVICE, OVERWRITE, SHAPES, TARGET
+from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
-from facert.wording import plural
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.take import Take
     from facert.evaluation.protocol import Problem
     from facert.evaluation.run import Grid
     from facert.evaluation.summary import Row

@@ -12,14 +12,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 
 import facert
 from facert.cli import console
+from facert.data.ranges import parse_range
+from facert.data.text import plural
 from facert.evaluation.cells import Outcome
 from facert.evaluation.defaults import default_labels, default_unlabelled
 from facert.evaluation.protocol import Problem
 from facert.evaluation.run import Grid, fingerprint, run
 from facert.io.journal import Journal, source_digest
-from facert.ranges import parse_range
 from facert.settings import Settings
-from facert.wording import plural
 
 MANY = 250
 """With so many posed frames numbers need no word: they are those that the help tells."""

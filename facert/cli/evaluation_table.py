@@ -11,8 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from facert.cli import console
+from facert.data.text import plural
 from facert.evaluation.summary import Row, best
-from facert.wording import plural
 
 Column = Callable[[Row], str]
 WIDEST = 160

@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
-from facert.data import Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Take
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence

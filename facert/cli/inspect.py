@@ -42,7 +42,7 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
         return {"kind": "model", **load(path).facts}
     from dataclasses import asdict
 
-    from facert.inspection import summarise
+    from facert.data.summary import summarise
     from facert.io.formats import read_any, targets_of
     from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
     from facert.io.npz import NO_TARGET

@@ -77,10 +77,10 @@ def chosen_handling(
 ) -> Handling:
     """What the options ask for, of a take that goes through this model."""
     from facert.adjustments import Adjustments
+    from facert.data.ranges import parse_frames
     from facert.errors import reading
     from facert.handling import Handling
     from facert.io.toml import read_toml
-    from facert.ranges import parse_frames
 
     adjustments = None
     if controls is not None:

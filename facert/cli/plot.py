@@ -10,11 +10,11 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, TARGET
+from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.wording import plural
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.take import Take
 
 
 def command(
@@ -53,7 +53,7 @@ def command(
 
 def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:
     """Both with the controls that they share, in the spelling of the take."""
-    from facert.shared_controls import require_shared
+    from facert.data.shared_controls import require_shared
 
     fix = "Give the truth of this take, or choose another --target."
     shared = require_shared(truth, take, fix)

@@ -9,12 +9,13 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES
-from facert.wording import plural
+from facert.data.text import plural
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from facert.data import IntArray, Mesh
+    from facert.data.arrays import IntArray
+    from facert.data.rig import Mesh
 
 app = typer.Typer(help="Feature points of a face.", no_args_is_help=True)
 

@@ -15,7 +15,7 @@ from facert.errors import InputError, reading
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from facert.data import Take
+    from facert.data.take import Take
     from facert.posing.pose import CompletedPose
     from facert.retargeter import Retargeter
 

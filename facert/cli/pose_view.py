@@ -13,7 +13,8 @@ from facert.cli.train import DEFAULT_MODEL
 from facert.errors import InputError, OutputExistsError, reading
 
 if TYPE_CHECKING:
-    from facert.data import Rig, Take
+    from facert.data.rig import Rig
+    from facert.data.take import Take
     from facert.pages.session import Session
     from facert.retargeter import Retargeter
 

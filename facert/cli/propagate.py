@@ -10,10 +10,11 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, TARGET
-from facert.wording import plural
+from facert.data.text import plural
 
 if TYPE_CHECKING:
-    from facert.data import IntArray, Take
+    from facert.data.arrays import IntArray
+    from facert.data.take import Take
 
 
 class Limits(StrEnum):

@@ -10,10 +10,10 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES, TARGET
-from facert.wording import plural
+from facert.data.text import plural
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.take import Take
     from facert.view.faces import Face
 
 FACES = 6

@@ -9,8 +9,8 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError
-from facert.wording import plural
 
 ENDINGS = (".html", ".htm")
 

@@ -25,11 +25,11 @@ from facert.cli.options import (
     chosen_handling,
 )
 from facert.cli.train import DEFAULT_MODEL
+from facert.data.text import plural
 from facert.errors import reading
-from facert.wording import plural
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.take import Take
     from facert.handling import Handling
     from facert.retargeter import Retargeter
 
@@ -148,7 +148,7 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _tell_error(take: Take, result: Take, retargeter: Retargeter) -> None:
     """RMS over the poses that the input held, but for those that the model was trained on."""
-    from facert.shared_controls import shared_controls
+    from facert.data.shared_controls import shared_controls
 
     if not len(take.labels):
         return

@@ -9,7 +9,7 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES
-from facert.wording import plural
+from facert.data.text import plural
 
 
 def command(

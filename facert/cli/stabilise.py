@@ -10,12 +10,12 @@ import typer
 from facert.cli import console
 from facert.cli.batch import require_other_file
 from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
+from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.wording import plural
 
 if TYPE_CHECKING:
     from facert.cleaning.stabilisation import Stabilised
-    from facert.data import FloatArray
+    from facert.data.arrays import FloatArray
 
 
 def command(

@@ -10,10 +10,11 @@ import typer
 
 from facert.cli import console
 from facert.cli.options import OVERWRITE, SHAPES, TARGET
-from facert.wording import plural
+from facert.data.text import plural
 
 if TYPE_CHECKING:
-    from facert.data import IntArray, Take
+    from facert.data.arrays import IntArray
+    from facert.data.take import Take
     from facert.retargeter import Retargeter
     from facert.suggestion.frames import Suggestion
 
@@ -116,7 +117,7 @@ def _model(path: str) -> Retargeter:
 
 def _rows(take: Take, found: Suggestion) -> list[dict[str, object]]:
     """A line for each frame; without a timecode where the take has none."""
-    from facert.timecode import timecode
+    from facert.data.timecode import timecode
 
     rows: list[dict[str, object]] = []
     for frame, share in zip(found.frames.tolist(), found.shares.tolist(), strict=True):

@@ -16,9 +16,9 @@ from facert.methods import REGISTRY
 from facert.settings import OF_SHARED, Settings
 
 if TYPE_CHECKING:
-    from facert.data import Take
+    from facert.data.regions import Regions
+    from facert.data.take import Take
     from facert.optim.monitor import Monitor
-    from facert.regions.nouns import Regions
     from facert.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")
@@ -187,8 +187,8 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
 
 def _regions(given: str | None) -> Regions | str | None:
     """Of the option: the word auto, or what is in a file."""
+    from facert.data.regions import AUTO
     from facert.io.regions import read_regions
-    from facert.regions.nouns import AUTO
 
     return given if given in (AUTO, None) else read_regions(Path(given))
 

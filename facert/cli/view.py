@@ -12,7 +12,8 @@ from facert.cli.options import SHAPES, TARGET
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
-    from facert.data import Rig, Take
+    from facert.data.rig import Rig
+    from facert.data.take import Take
     from facert.pages.performance import Performance
     from facert.retargeter import Retargeter
     from facert.view.faces import Face

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.demo.expressions import ACTIVATIONS
 
 Pose = Mapping[str, float]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.demo.expressions import ACTIVATIONS
 
 EASE = 2.0

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.demo.build import Blob
 
 ORIGIN = np.array([0.0, 1.0, 0.0])  # inside of the head; every point of the skin is seen from here

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.demo.head import Head
 from facert.demo.parts import Tissue
 from facert.demo.skin import LID_EDGE, LIP_EDGE

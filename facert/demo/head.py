@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.demo import parts
 from facert.demo.build import Build
 from facert.demo.parts import Piece

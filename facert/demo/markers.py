@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data import IntArray
+from facert.data.arrays import IntArray
 from facert.demo.clay import cast_from_front
 from facert.demo.head import Head
 from facert.demo.skin import LID_EDGE, LIP_BORDER, LIP_EDGE

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.demo.build import Build, Colour
 from facert.demo.clay import ORIGIN, cast_from_front, cast_from_inside
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.demo.build import Build
 from facert.demo.clay import FORWARD, ORIGIN, cast_from_front, cast_from_inside
 from facert.demo.parts import Piece, strips

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, IntArray, Rig, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.demo import acting, build
 from facert.demo.character import CONTROLS, animate, control_shapes
 from facert.demo.expressions import ACTIVATIONS, expressions

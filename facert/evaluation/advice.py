@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.text import plural
 from facert.evaluation.cells import Outcome
 from facert.evaluation.comparison import Estimate, errors_by_method
-from facert.wording import plural
 
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
 FIRM = 5  # draws from which on advice can stand alone

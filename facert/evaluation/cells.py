@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import Take
+from facert.data.take import Take
 from facert.errors import FacertError
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
 from facert.handling import AS_IT_IS

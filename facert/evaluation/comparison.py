@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.evaluation.cells import Outcome
 
 LEAST = 1e-12  # an RMS below this is as good as none; one can still divide by it

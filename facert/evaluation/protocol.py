@@ -12,14 +12,16 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from facert.data import BoolArray, Controls, FloatArray, IntArray, Rig, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.names import match
+from facert.data.normalisation import Normalisation
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.metrics import vertex_gram
-from facert.names import match
-from facert.normalisation import Normalisation
 from facert.sanity import foretold_poses
 from facert.training_set import MIN_OBSERVED
-from facert.wording import plural
 
 Split = Literal["random", "block"]
 

@@ -17,7 +17,7 @@ from threading import Thread
 import numpy as np
 
 import facert
-from facert.data import Take
+from facert.data.take import Take
 from facert.errors import FacertError
 from facert.evaluation.cells import Cell, Outcome, evaluate
 from facert.evaluation.protocol import Problem, draw

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.evaluation.cells import Outcome
 from facert.evaluation.protocol import Protocol
 from facert.metrics import Scores

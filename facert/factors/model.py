@@ -29,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.factors.censoring import CensoredPoses, Limits
 
 FACTORS = 24  # at most

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dpotrf, dtrtri
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import NumericalError
 
 log = logging.getLogger(__name__)

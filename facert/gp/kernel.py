@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 INITIAL_THETA = (1.0, 1.0, 100.0)  # the paper's {θ1, θ2, θ3}
 LEAST_EXCESS = 1e-3  # noise above the floor where a search begins, relative to the floor

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg.blas import dsymm, dsyrk
 from scipy.linalg.lapack import dlauum
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.jitter import inverted, lower_factor
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.jitter import whitener
 from facert.gp.kernel import Kernel
 

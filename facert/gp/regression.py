@@ -32,7 +32,7 @@ from scipy.linalg import cho_solve, cholesky
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.kernel import Kernel
 
 # Of (log w, log ν, log λ). The widest kernel is as good as linear, the narrowest as good as noise.

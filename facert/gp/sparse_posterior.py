@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.kernel import Kernel
 from facert.gp.posterior import Predictor
 from facert.gp.sparse import APPROXIMATIONS, ApproximationName, factorise

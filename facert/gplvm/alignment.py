@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 
 def align(M: sparse.csr_array, latent_dim: int) -> FloatArray:

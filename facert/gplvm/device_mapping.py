@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.posterior import Predictor
 from facert.gplvm.source_mapping import Expansion, Mapped, Observation, SourceMapping
 

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.gp.lapack import value_and_gradient
 from facert.gplvm.prior import product
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.posterior import Predictor
 
 MOST_STEPS = 12

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import KDTree
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 # Added to the local Gram matrix, relative to its trace, when neighbours are nearly dependent.
 REGULARISATION = 1e-3

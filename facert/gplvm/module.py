@@ -7,7 +7,7 @@ import torch
 from scipy import sparse
 from torch import Tensor, nn
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.kernel import Kernel, initial_log_kernel
 from facert.gp.likelihood import compact_factor, negative_log_likelihood
 from facert.gp.posterior import Posterior, Predictor

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.settings import Settings
 
 # Normalised units. Below the first, source mapping begins to stick to the training latents (their

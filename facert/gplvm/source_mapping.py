@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 from facert.gp.posterior import PosteriorPoint, Predictor
 from facert.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping, Stand
 

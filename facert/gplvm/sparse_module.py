@@ -16,7 +16,7 @@ import torch
 from scipy import sparse
 from torch import Tensor, nn
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.gp.posterior import Predictor
 from facert.gp.sparse import ApproximationName, sparse_negative_log_likelihood
 from facert.gp.sparse_posterior import sparse_posterior

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.normalisation import Normalisation
 from facert.gp.kernel import Kernel
 from facert.gp.posterior import Posterior, Predictor
 from facert.gplvm.source_mapping import Observation, SourceMapping
-from facert.normalisation import Normalisation
 
 # Rows of a core: labels at most, and unlabelled rows of each view.
 CORE_LABELS, CORE_ALONE = 400, 100

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.gp.posterior import Predictor
 from facert.gplvm.source_mapping import CHUNK, Mapped
 

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from facert.data import FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.text import MAX_BYTES, existing_file
-from facert.wording import plural
 
 if TYPE_CHECKING:
     from c3d import Reader

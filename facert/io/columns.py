@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from facert.data import FloatArray, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Take
 from facert.errors import InputError
 
 

@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, Take
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.columns import named_curves

@@ -11,11 +11,11 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from facert.data import Source, Take
+from facert.data.names import canonical
+from facert.data.take import Source, Take
 from facert.errors import InputError, reading
 from facert.io.rate import nominal_rate
 from facert.io.text import Row, check_width, read_text, to_numbers
-from facert.names import canonical
 
 log = logging.getLogger("facert")
 

@@ -26,7 +26,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
-from facert.data import Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Take
+from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
 from facert.io import npz
 from facert.io.c3d import read_c3d
@@ -43,7 +45,6 @@ from facert.io.table import read_table, write_table
 from facert.io.take import read_take, write_take
 from facert.io.text import existing_file, read_header
 from facert.io.trc import read_trc
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

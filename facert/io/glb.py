@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import facert
-from facert.data import FloatArray, IntArray, Mesh
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh
+from facert.data.units import in_metres
 from facert.errors import InputError
 from facert.geometry import vertex_normals
 from facert.io.atomic import replacing
 from facert.morphs import Morphs
-from facert.units import in_metres
 
 _GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}

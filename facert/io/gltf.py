@@ -20,7 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError, reading
 from facert.io.curves import parse_json_object
 from facert.io.text import MAX_BYTES, existing_file

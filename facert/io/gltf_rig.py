@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Mesh, Rig
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh, Rig
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
 

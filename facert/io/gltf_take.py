@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
 from facert.io.gltf_rig import target_names

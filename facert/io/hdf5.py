@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import facert
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.text import existing_file

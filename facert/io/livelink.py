@@ -14,7 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray, Source, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.names import ARKIT_NAMES, canonical, match, nearest
+from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.livelink_clock import (
@@ -28,8 +31,6 @@ from facert.io.livelink_clock import (
 )
 from facert.io.rate import nominal_rate
 from facert.io.text import Row, check_width, read_csv, to_numbers
-from facert.names import ARKIT_NAMES, canonical, match, nearest
-from facert.wording import plural
 
 __all__ = [
     "TICKS",

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import IntArray
+from facert.data.arrays import IntArray
 
 TICKS = 60_000
 """Ticks a second: timecodes count thousandths of 1/60 s, and are kept as whole numbers."""

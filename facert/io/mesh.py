@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facert.data import Mesh
+from facert.data.rig import Mesh
 from facert.errors import reading
 from facert.io.formats import GLTF_ENDINGS, read_rig_file
 from facert.io.gltf_rig import read_gltf_mesh

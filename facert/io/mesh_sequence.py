@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.arrays import require_time
-from facert.data import FloatArray, IntArray, Mesh, MeshSequence
+from facert.data.arrays import FloatArray, IntArray, require_time
+from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, reading
 from facert.io.hdf5 import GuardedFile, NewRows, create, open_guarded, stated_format
 

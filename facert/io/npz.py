@@ -26,7 +26,9 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
-from facert.data import Controls, FloatArray, IntArray, Rig, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, reading
 from facert.io.rate import nominal_rate
 from facert.io.text import existing_file

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Rig
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Rig
 from facert.errors import InputError, reading
 from facert.io.text import read_text
 

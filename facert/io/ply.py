@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data import FloatArray, IntArray, Mesh
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh
 from facert.errors import InputError, reading
 from facert.io.text import MAX_BYTES, existing_file
 

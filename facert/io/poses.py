@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import Take
+from facert.data.labelling import Poses, poses_of
+from facert.data.take import Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.text import check_width, read_csv, read_header, to_numbers
-from facert.labelling import Poses, poses_of
 from facert.sanity import foretold_poses
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 ONE_FRAME = 30.0
 """What a single frame is said to run at."""

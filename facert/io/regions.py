@@ -12,9 +12,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from facert.data.regions import Regions
 from facert.errors import reading
 from facert.io.toml import read_toml
-from facert.regions.nouns import Regions
 
 EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
 WIDTH = 100

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.io.hdf5 import create, open_guarded
 
 FORMAT = "facert-rig"

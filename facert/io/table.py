@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import Source, Take
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.columns import named_columns

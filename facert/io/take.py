@@ -31,7 +31,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data import Controls, FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.io.hdf5 import GuardedFile, NewFile, create, open_guarded
 

@@ -16,7 +16,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.text import existing_file

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 
 MAX_BYTES = 2**29

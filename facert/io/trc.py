@@ -17,11 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.rate import nominal_rate
 from facert.io.text import Row, read_text, to_numbers
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 import facert
+from facert.data.units import in_metres
 from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
 from facert.morphs import Morphs
-from facert.units import in_metres
 
 ENDINGS = (".usd", ".usda", ".usdc")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from facert.data import Take
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.live.frames import Counters, Decoder, Encoder
 from facert.live.ifacialmocap import IFacialMocapDecoder

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from facert.data import FloatArray, Source, SourceKind, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Source, SourceKind, Take
 
 if TYPE_CHECKING:
     from facert.streaming import Streamed

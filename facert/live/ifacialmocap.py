@@ -10,8 +10,8 @@ import re
 
 import numpy as np
 
+from facert.data.names import ARKIT_SHAPES, canonical
 from facert.live.frames import BadPacketError, Observed, frame_pattern
-from facert.names import ARKIT_SHAPES, canonical
 
 _FIELD = re.compile(r"([A-Za-z_]{1,40})[-&](-?\d{1,4})")
 _LEAST = len(ARKIT_SHAPES) // 2

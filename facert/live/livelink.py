@@ -23,10 +23,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import ARKIT_NAMES, NameIndex, nearest
 from facert.errors import InputError
 from facert.live.frames import BadPacketError, Observed, frame_pattern
-from facert.names import ARKIT_NAMES, NameIndex, nearest
 
 log = logging.getLogger("facert")
 

@@ -23,7 +23,8 @@ from facert.live.placement import PlacementWatch
 from facert.live.rest import RestWatch
 
 if TYPE_CHECKING:
-    from facert.data import FloatArray, Take
+    from facert.data.arrays import FloatArray
+    from facert.data.take import Take
     from facert.retargeter import Retargeter
     from facert.streaming import RetargetStream, Streamed
 

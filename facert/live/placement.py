@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.cleaning.watching import MarkerWatch
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
+from facert.data.names import NameIndex
 from facert.live.frames import Frame
 from facert.live.rest import RestWatch
-from facert.names import NameIndex
 from facert.rigid import align, determined
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from facert.data import FloatArray, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Take
 from facert.io.livelink import TICKS, format_timecode
 from facert.live.frames import BadPacketError, Counters, Decoder, Frame, Observed, frame_pattern
 from facert.live.order import Order

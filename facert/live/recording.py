@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Controls, Source, Take
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.io.formats import write_take_file
 from facert.io.rate import nominal_rate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.cleaning.watching import MarkerWatch
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.live.frames import Frame
 from facert.neutral import median_at_rest
 

@@ -21,11 +21,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, SourceKind
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex
+from facert.data.take import SourceKind
 from facert.live.frames import BadPacketError, Observed, frame_pattern
 from facert.live.osc import Bundles, Message, message, parse
 from facert.live.osc_layout import Layouts
-from facert.names import NameIndex
 
 _VMC = "/VMC/"
 _VALUE, _CLOCK, _APPLY = "/VMC/Ext/Blend/Val", "/VMC/Ext/T", "/VMC/Ext/Blend/Apply"

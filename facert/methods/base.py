@@ -12,8 +12,8 @@ from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
-from facert.data import FloatArray
-from facert.normalisation import Normalisation
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.optim.base import Result
 from facert.optim.monitor import Monitor
 from facert.settings import Settings

@@ -29,8 +29,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import nnls
 
-from facert.data import FloatArray
-from facert.learned import Arrays
+from facert.data.array_group import Arrays
+from facert.data.arrays import FloatArray
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.factors import FactorMap, Trio, left_out_poses
 from facert.methods.one_frame import BlendFrame

@@ -15,11 +15,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.array_group import DAMAGED
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.factors.censoring import Limits
 from facert.factors.model import Evidence, learn_factors
-from facert.learned import DAMAGED
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import ranked_folds
 from facert.methods.regression import Map

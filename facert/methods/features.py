@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 LEAST_DIRECTIONS = 12  # to tell noise from motion by
 EPSILON = 1e-5  # ε: directions smaller than this fade out, whatever the noise

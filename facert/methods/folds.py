@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 FOLDS = 5
 

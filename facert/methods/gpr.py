@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.array_group import DAMAGED
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.gp.jitter import whitener
 from facert.gp.regression import (
@@ -22,7 +23,6 @@ from facert.gp.regression import (
     RegressionKernel,
     maximise_likelihood,
 )
-from facert.learned import DAMAGED
 from facert.methods.regression import Map, SupervisedRegression
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.methods.regression import Map, SupervisedRegression
 
 # Enough to tell a frame that was posed twice, differently, from a contradiction.

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from sklearn.cross_decomposition import PLSRegression
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.methods.folds import blocked_folds
 from facert.methods.regression import Map, SupervisedRegression
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.factors.censoring import LOG_2PI
 from facert.methods.frame_stream import Tell
 

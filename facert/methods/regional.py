@@ -21,9 +21,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.array_group import DAMAGED, Arrays
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.normalisation import Normalisation
+from facert.data.regions import MOST
 from facert.errors import InputError
-from facert.learned import DAMAGED, Arrays
 from facert.methods import make_method
 from facert.methods.base import (
     IN_TARGET_UNITS,
@@ -34,9 +36,7 @@ from facert.methods.base import (
     Stream,
     Unlabelled,
 )
-from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
-from facert.regions.nouns import MOST
 from facert.settings import Settings
 
 WHOLE = 1e-9  # by which the weights of a control may miss 1

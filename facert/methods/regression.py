@@ -15,15 +15,15 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.array_group import DAMAGED, Arrays, check_axes
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.gaps import Gaussian
-from facert.learned import DAMAGED, Arrays, check_axes
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.device import find_device
 from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.metrics import rms
-from facert.normalisation import Normalisation
 from facert.optim.monitor import Monitor
 from facert.settings import Settings
 from facert.threads import threads_for

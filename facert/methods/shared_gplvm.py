@@ -19,7 +19,9 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from scipy.sparse import csr_array
 
-from facert.data import FloatArray
+from facert.data.array_group import DAMAGED
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.gp.posterior import Predictor
 from facert.gp.sparse import ApproximationName
@@ -37,11 +39,9 @@ from facert.gplvm.sparse_module import SparseSharedGPLVM
 from facert.gplvm.staging import Core, Start
 from facert.gplvm.target_mapping import map_to_target
 from facert.gplvm.training import train
-from facert.learned import DAMAGED
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.device import find_device
 from facert.methods.views import view_arrays, view_from
-from facert.normalisation import Normalisation
 from facert.optim.base import Result
 from facert.optim.lbfgs import LBFGS
 from facert.optim.monitor import Monitor

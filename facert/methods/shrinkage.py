@@ -20,8 +20,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data import FloatArray
-from facert.learned import Arrays
+from facert.data.array_group import Arrays
+from facert.data.arrays import FloatArray
 
 # Added to the covariance of all poses, relative to its mean variance: few poses leave it singular.
 RIDGE = 1e-6

@@ -15,9 +15,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.array_group import Arrays
+from facert.data.arrays import FloatArray
 from facert.gp.regression import maximise_likelihood
-from facert.learned import Arrays
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.features import whitening
 from facert.methods.gpr import ProcessMap

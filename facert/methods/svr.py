@@ -12,7 +12,7 @@ import sklearn
 from scipy.spatial.distance import cdist
 from sklearn import svm
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.methods.folds import blocked_folds
 from facert.methods.regression import Map, SupervisedRegression
 

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.array_group import DAMAGED, check_axes
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.gp.kernel import Kernel
 from facert.gp.posterior import Posterior, Predictor
-from facert.learned import DAMAGED, check_axes
 
 EXACT = {"latents": "nq", "observations": "nd", "kernel": "3"}
 SPARSE = {"latents": "mq", "whitener": "mm", "weights": "md", "kernel": "3"}

@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import NumericalError
 
 Objective = Callable[[FloatArray], tuple[float, FloatArray]]

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import NumericalError
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.optim.base import Objective, State, Watcher, initial_state
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.optim.base import Objective, State, Watcher, initial_state
 
 SIGMA = 1e-5  # step of the finite difference that gives the curvature, relative to 1/|p|

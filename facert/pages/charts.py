@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, Take
+from facert.data.arrays import FloatArray
+from facert.data.take import Take
 from facert.view.plots import CURVE, INK, TRUTH
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import Controls
 from facert.posing.completion import Completion, Posed
 from facert.posing.correction import correct
 from facert.posing.known import Given, KnownPoses

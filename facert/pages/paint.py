@@ -11,7 +11,8 @@ from html import escape
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Mesh
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh
 from facert.view.shade import CLAY
 
 MOST = 24  # colours of a face

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Rig, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import shape_drivers
+from facert.data.rig import Rig
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.metrics import compare, vertex_errors, vertex_gram
-from facert.names import shape_drivers
 from facert.pages.paint import Scale
 from facert.view.faces import Face, posed_face
 

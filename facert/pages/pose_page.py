@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from viser import Icon
 
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.pages.desk import Desk, slider_bounds
 from facert.pages.playback import Playback

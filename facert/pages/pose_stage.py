@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, Rig
-from facert.names import shape_drivers
+from facert.data.arrays import FloatArray
+from facert.data.names import shape_drivers
+from facert.data.rig import Rig
 from facert.pages.paint import skin
 from facert.pages.session import Session
 from facert.pages.stage import FacePart, MarkerPart, Stage

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, Rig, Take
+from facert.data.arrays import FloatArray
+from facert.data.names import match
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
 from facert.errors import InputError
 from facert.io.take import write_take
 from facert.metrics import rms
-from facert.names import match
 from facert.posing.known import KnownPoses, keep
 from facert.posing.pose import LEAST
 from facert.retargeter import Retargeter

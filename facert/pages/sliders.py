@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from viser import Icon
 
-from facert.data import FloatArray, IntArray
-from facert.names import control_groups
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import control_groups
 
 if TYPE_CHECKING:
     from viser import GuiButtonHandle, GuiEvent, GuiSliderHandle, ViserServer

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray, Mesh
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.rig import Mesh
 from facert.geometry import vertex_normals
 from facert.pages.paint import LEVELS, MOST, Paint
 from facert.view.shade import frame_mesh

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from viser import Icon
 
-from facert.data import IntArray, Take
+from facert.data.arrays import IntArray
+from facert.data.take import Take
+from facert.data.timecode import timecode
 from facert.pages.playback import Playback
-from facert.timecode import timecode
 
 if TYPE_CHECKING:
     from viser import GuiButtonHandle, GuiEvent, GuiSliderHandle, ViserServer

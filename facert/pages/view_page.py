@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.pages.charts import Chart, most_varying
 from facert.pages.paint import Paint, Scale, skin
 from facert.pages.performance import Performance, highest

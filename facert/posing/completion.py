@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.posing.known import Given, KnownPoses
 from facert.posing.regression import PoseRegression
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.posing.completion import Posed
 from facert.posing.known import Given, KnownPoses
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 # Beyond, more poses tell little, and a new set of given controls takes longer to learn.
 MOST = 500

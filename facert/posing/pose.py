@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from facert.data import Controls, FloatArray, IntArray, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, fitting, instead_of, match
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.names import NameIndex, fitting, instead_of, match
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.posing.known import Given, KnownPoses, keep

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.special import softmax
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 
 NOISES = np.logspace(-3.5, 2.0, 9)
 TOGETHER = 3.0

@@ -15,18 +15,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, Take
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.names import control_groups
+from facert.data.regions import Region, Regions
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
-from facert.names import control_groups
 from facert.regions.bipartition import two_groups
 from facert.regions.foretelling import left_out_errors
-from facert.regions.nouns import Region, Regions
 
 log = logging.getLogger(__name__)
 
 UPPER, LOWER, BETWEEN, WHOLE = "brows-and-eyes", "mouth-and-jaw", "between", "face"
-# The side of each group of `facert.names`: upper, lower or between; others do not tell.
+# The side of each group of `facert.data.names`: upper, lower or between; others do not tell.
 SIDES = {"brows": 1.0, "eyes": 1.0, "nose": 0.0, "cheeks": 0.0, "mouth": -1.0, "jaw": -1.0}
 CLEAR = 0.6  # by which the logarithms of two mean squared errors must differ to tell
 CALM = 0.2  # what a ratio of variances counts beside one of errors, in logarithms

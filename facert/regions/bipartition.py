@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 
 TIED = 0.05  # ε: near markers are tied a little, even where noise hides how they move
 NEIGHBOUR = 3  # h is twice the median distance to the neighbour of this rank

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.methods.features import whitening
 
 POWER = 0.5  # half-whitening of the markers

@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import BoolArray, Controls, FloatArray, Source
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.regions import Region, Regions
+from facert.data.take import Controls, Source
 from facert.errors import InputError
 from facert.gplvm.noise import with_noise
 from facert.methods import make_method
 from facert.methods.base import Method
 from facert.methods.regional import Layout, Regional
-from facert.normalisation import Normalisation
 from facert.regions.foretelling import left_out_errors
-from facert.regions.nouns import Region, Regions
 from facert.settings import Settings
 
 FAULTLESS = 1e-9  # least error of a region, relative to the variance of the control

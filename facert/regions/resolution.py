@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from facert.data import Take
+from facert.data.regions import Regions
+from facert.data.take import Take
 from facert.regions.automatic import find_regions
-from facert.regions.nouns import Regions
 
 
 def resolved(wanted: Regions | str | None, take: Take, prepared: Take) -> Regions | None:

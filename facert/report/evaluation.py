@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
 
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.figures import INK, plot_errors
 from facert.evaluation.summary import Row, best
 from facert.io.text import existing_file, read_text
 from facert.report.pictures import embedded
 from facert.report.sections import Fact, Picture, Section, Table
-from facert.wording import plural
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

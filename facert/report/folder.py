@@ -11,7 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 import facert
-from facert.data import Controls, Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.curves import read_json_object
 from facert.io.formats import HDF5_ENDINGS, read_take_file
@@ -22,7 +24,6 @@ from facert.io.take import FORMAT as TAKE_FORMAT
 from facert.report.evaluation import read_evaluation
 from facert.report.performance import fits, performance_section, truth_among
 from facert.report.sections import Fact, Section
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from facert.data import Rig, Take
+from facert.data.names import shape_drivers
+from facert.data.rig import Rig
+from facert.data.shared_controls import SharedControls, require_shared, shared_controls
+from facert.data.take import Take
+from facert.data.text import plural
 from facert.errors import InputError
 from facert.metrics import Comparison, compare
-from facert.names import shape_drivers
 from facert.report.pictures import embedded
 from facert.report.sections import Fact, Picture, Section, Table
-from facert.shared_controls import SharedControls, require_shared, shared_controls
 from facert.view.faces import choose_frames, posed_face, require_poses
 from facert.view.plots import plot_controls
 from facert.view.render import render_sheet
-from facert.wording import plural
 
 FACES = 6
 PIXELS = 240  # a face a side: a page shows six beside each other

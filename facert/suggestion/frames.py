@@ -18,11 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from facert.data import BoolArray, FloatArray, IntArray, SourceKind, Take
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import SourceKind, Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
 from facert.methods.features import whitening
-from facert.normalisation import Normalisation
 from facert.retargeter import Retargeter
 from facert.suggestion.medoids import LEAST_GAIN, Choice
 from facert.training_set import MIN_OBSERVED

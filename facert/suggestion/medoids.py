@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 
 MOST_EXCHANGES = 200
 LEAST_GAIN = 1e-6  # an exchange that gains less, relative to the sum, is rounding

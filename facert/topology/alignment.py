@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.topology.neighbourhoods import Neighbourhoods
 from facert.topology.tangent import LocalStructures, local_structures
 

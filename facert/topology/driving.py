@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy import sparse
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.errors import InputError
 from facert.topology import laplacian
 from facert.topology.alignment import alignment_matrix

@@ -9,7 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Mesh, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
 from facert.topology.labels import checked_labels

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.rigid import align
 
 PULL = 1e-6  # towards no rotation

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
 from facert.topology.solution import Dense
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from facert.data import IntArray
+from facert.data.arrays import IntArray
 from facert.errors import InputError
 from facert.topology.neighbourhoods import Neighbourhoods
 

@@ -12,7 +12,7 @@ import numpy as np
 import robust_laplacian
 from scipy import sparse
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.topology.neighbourhoods import adjacency
 
 

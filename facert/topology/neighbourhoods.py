@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from facert.data import IntArray
+from facert.data.arrays import IntArray
 from facert.errors import InputError
 
 

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, nearest
 from facert.errors import InputError
-from facert.names import NameIndex, nearest
 
 Fit = Literal["none", "uniform", "axes"]
 

@@ -24,7 +24,7 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.topology.alignment import alignment_matrix
 from facert.topology.interpolation import Kernel, radial_basis

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.path import SmoothPath, trust_in_path
 

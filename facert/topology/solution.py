@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
 
 SINGULAR = 1e-13

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray, Rig
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.topology.driving import smooth_energy
 from facert.topology.labels import checked_labels

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 NEAR = 0.2  # of the median distance of neighbouring vertices: no farther from its mirror image
 MOST = 0.95  # of the vertices must find theirs

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
-from facert.names import NameIndex
 from facert.settings import LimitRule
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
 from facert.topology.neighbourhoods import Neighbourhoods
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import FloatArray, MeshSequence, Rig, Take
+from facert.data.arrays import FloatArray
+from facert.data.names import shape_drivers
+from facert.data.rig import MeshSequence, Rig
+from facert.data.take import Take
 from facert.errors import InputError
-from facert.names import shape_drivers
 from facert.view.faces import Face, frame_faces
 from facert.view.render import checked_frames
 from facert.view.shade import shade
@@ -88,7 +90,7 @@ def actor_face(take: Take, rig: Rig) -> Face:
     Raises
     ------
     InputError
-        When the rig has a shape for none of the weights, see `facert.names.shape_drivers`.
+        When the rig has a shape for none of the weights, see `facert.data.names.shape_drivers`.
     """
     known = [name for name in take.source.names if _drives(name, rig)]
     if not known:

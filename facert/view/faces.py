@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, MeshSequence, Rig, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import shape_drivers
+from facert.data.rig import MeshSequence, Rig
+from facert.data.take import Take
 from facert.errors import InputError
-from facert.names import shape_drivers
 from facert.view.shade import Camera, frame_mesh
 
 TURN = -0.22  # radians; seen a little from the side, a face has more shape
@@ -66,7 +68,7 @@ def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
     ------
     InputError
         When the take has no poses, or a control that the rig has no shape for, see
-        `facert.names.shape_drivers`.
+        `facert.data.names.shape_drivers`.
     """
     poses, controls = require_poses(take), take.controls
     assert controls is not None  # poses come with controls

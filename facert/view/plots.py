@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import Take
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.view.faces import require_poses
 

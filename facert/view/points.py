@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import IntArray, Mesh
+from facert.data.arrays import IntArray
+from facert.data.rig import Mesh
 from facert.view.shade import frame_mesh, shade
 
 if TYPE_CHECKING:

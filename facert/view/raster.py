@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
 
 _HAIR = 1e-9  # pixels, and weights
 _FAR = 1e9

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data import Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Take
 from facert.errors import InputError
 from facert.view.faces import Face, frame_faces, posed_face, require_same_length
 from facert.view.shade import Camera, shade

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facert.data import Source, Take
+from facert.data.take import Source, Take
 from facert.rigid import RigidMotion
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facert.cleaning.detection import exchanged, find_faults, held_values, single_spikes
-from facert.data import Source
+from facert.data.take import Source
 from facert.io.formats import read_take_file
 
 

@@ -6,7 +6,7 @@ from facert.cleaning.filtering import MotionFilter, _FactorFilter, _SeriesFilter
 from facert.cleaning.motion import Motion
 from facert.cleaning.smoothing import smooth_factors, smooth_series
 from facert.cleaning.watching import HELD, MarkerWatch
-from facert.normalisation import Normalisation
+from facert.data.normalisation import Normalisation
 
 SIGMA = 0.1
 

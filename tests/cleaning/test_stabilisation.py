@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facert.cleaning.stabilisation import stabilise, stable_markers
-from facert.data import Source, Take
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.formats import read_take_file
 from facert.rigid import align

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.data import Source
+from facert.data.take import Source
 from facert.io.take import read_take
 
 

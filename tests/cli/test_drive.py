@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.data import Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.io.formats import write_rig_file
 from facert.io.mesh_sequence import open_mesh_sequence
 from facert.topology.driving import FaceDriver

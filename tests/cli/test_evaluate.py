@@ -2,10 +2,10 @@ import json
 
 import pytest
 
+from facert.data.ranges import default_step, parse_range
 from facert.errors import InputError
 from facert.io.take import write_take
 from facert.methods import REGISTRY
-from facert.ranges import default_step, parse_range
 
 
 @pytest.fixture

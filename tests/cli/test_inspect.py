@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from facert import Settings, train
-from facert.data import Controls, Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.io.formats import write_rig_file, write_take_file
 
 

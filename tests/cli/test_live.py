@@ -23,8 +23,8 @@ from pythonosc.osc_server import BlockingOSCUDPServer
 
 import facert as api
 from facert import Settings
-from facert.data import Controls, Source, Take
-from facert.names import ARKIT_SHAPES
+from facert.data.names import ARKIT_SHAPES
+from facert.data.take import Controls, Source, Take
 
 PATIENCE = 60.0
 SHAPES = ARKIT_SHAPES[:15]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from facert.data import Controls, MeshSequence, Rig, Source, Take
+from facert.data.rig import MeshSequence, Rig
+from facert.data.take import Controls, Source, Take
 from facert.io.gltf_rig import read_gltf_mesh
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.io.rig import read_rig, write_rig

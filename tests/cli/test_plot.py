@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facert.data import Controls, Take
+from facert.data.take import Controls, Take
 from facert.io.take import write_take
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.data import Controls
+from facert.data.take import Controls
 
 NAMES = ["jawOpen", "mouthSmileLeft", "browInnerUp", "cheekPuff"]
 LIMITS = np.tile([-3.0, 3.0], (4, 1))

@@ -6,7 +6,7 @@ import pytest
 
 import facert as api
 from facert.cli import drive, propagate
-from facert.data import Source
+from facert.data.take import Source
 from facert.topology import driving, propagation
 from facert.topology.takes import Propagation, propagate_poses
 

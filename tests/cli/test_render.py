@@ -10,7 +10,8 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
-from facert.data import Controls, MeshSequence, Rig, Source, Take
+from facert.data.rig import MeshSequence, Rig
+from facert.data.take import Controls, Source, Take
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.io.rig import write_rig
 from facert.io.take import write_take

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.data import Rig
+from facert.data.rig import Rig
 
 
 @pytest.fixture

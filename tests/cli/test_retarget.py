@@ -9,7 +9,7 @@ from safetensors.numpy import load, save
 
 import facert as api
 from facert import Settings
-from facert.data import Controls
+from facert.data.take import Controls
 
 
 @pytest.fixture(scope="module")

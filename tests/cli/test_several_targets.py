@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import facert as package
-from facert.data import Take
+from facert.data.take import Take
 
 
 @pytest.fixture(name="truth")

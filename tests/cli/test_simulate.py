@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.io.formats import read_take_file, write_rig_file
 
 

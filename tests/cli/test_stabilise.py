@@ -4,7 +4,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import facert as api
-from facert.data import Source, Take
+from facert.data.take import Source, Take
 from facert.io.take import read_take
 from facert.rigid import RigidMotion
 

@@ -11,7 +11,8 @@ import pytest
 from matplotlib.image import imread
 
 import facert as package
-from facert.data import Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.io.formats import write_rig_file, write_take_file
 
 VERTICES = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 
-from facert.data import Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Take
 from facert.demo import actor_rig, character_rig, performance_take, training_take, write_demo
 from facert.demo.acting import perform
 from facert.demo.character import CONTROLS, Control, animate

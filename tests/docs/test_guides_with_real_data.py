@@ -10,7 +10,8 @@ import pytest
 from following import DOCS, follow, stand_in
 
 import facert
-from facert.data import FloatArray, Rig
+from facert.data.arrays import FloatArray
+from facert.data.rig import Rig
 from facert.io.glb import write_glb
 from facert.morphs import Morphs
 

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from facert.data import Controls, Rig, Source
+from facert.data.normalisation import Normalisation
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source
 from facert.errors import InputError
 from facert.evaluation.protocol import (
     BLOCKS,
@@ -16,7 +18,6 @@ from facert.evaluation.protocol import (
     training_take,
     true_poses,
 )
-from facert.normalisation import Normalisation
 
 
 def sets(chosen):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.evaluation.cells import Cell, Outcome, cell_settings, evaluate
 from facert.evaluation.protocol import (

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facert.data import Source, Take
+from facert.data.names import ARKIT_SHAPES
+from facert.data.take import Source, Take
 from facert.importers import PROGRAMS, script
 from facert.importers.curves import find, keys, read_curves, spelling
 from facert.io.curves import write_curves
 from facert.io.formats import write_take_file
-from facert.names import ARKIT_SHAPES
 
 VALUES = np.array([[0.1, 0.5], [np.nan, 0.5], [0.3, 0.5]])
 TAKE = Take([0.5, 0.54, 0.58], Source(VALUES, ("jawOpen", "eyeBlink_L")), fps=25.0)

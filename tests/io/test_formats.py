@@ -7,14 +7,15 @@ import ezc3d
 import numpy as np
 import pytest
 
-from facert.data import Controls, Rig, Source, Take
+from facert.data.labelling import labelled
+from facert.data.names import ARKIT_SHAPES
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, OutputExistsError
 from facert.io import formats
 from facert.io.glb import write_glb
 from facert.io.poses import read_poses
-from facert.labelling import labelled
 from facert.morphs import rig_morphs
-from facert.names import ARKIT_SHAPES
 
 TAKE = Take(time=[0.0, 0.5], source=Source(np.array([[0.0], [1.0]]), ["jawOpen"]), fps=2.0)
 RIG = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from facert.data import Mesh, MeshSequence
+from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, OutputExistsError
 from facert.io.glb import write_glb
 from facert.morphs import Morphs, compact_morphs

@@ -11,7 +11,8 @@ import numpy as np
 import pygltflib as gltf
 import pytest
 
-from facert.data import Rig
+from facert.data.labelling import weights_as_poses
+from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.io.glb import write_glb
 from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
@@ -19,7 +20,6 @@ from facert.io.gltf_take import holds_animation, read_gltf_take
 from facert.io.livelink import read_livelink
 from facert.io.mesh import read_mesh
 from facert.io.npz import read_npz_rig
-from facert.labelling import weights_as_poses
 from facert.morphs import rig_morphs
 from facert.view.faces import control_settings
 

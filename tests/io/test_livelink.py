@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Controls, Source, Take
+from facert.data.names import ARKIT_NAMES, ARKIT_SHAPES
+from facert.data.take import Controls, Source, Take
+from facert.data.timecode import timecode
 from facert.errors import InputError
 from facert.io.formats import read_take_file
 from facert.io.livelink import (
@@ -17,8 +19,6 @@ from facert.io.livelink import (
     write_livelink,
 )
 from facert.io.rate import nominal_rate
-from facert.names import ARKIT_NAMES, ARKIT_SHAPES
-from facert.timecode import timecode
 
 DAY = 24 * 3600 * 60_000
 

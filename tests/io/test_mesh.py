@@ -8,7 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Mesh, Rig
+from facert.data.rig import Mesh, Rig
 from facert.errors import InputError
 from facert.io.mesh import read_mesh
 from facert.io.ply import read_ply

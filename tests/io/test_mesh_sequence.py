@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from facert.data import Mesh, MeshSequence
+from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, OutputExistsError
 from facert.io.hdf5 import MAX_VALUES
 from facert.io.mesh_sequence import new_mesh_sequence, open_mesh_sequence, write_mesh_sequence

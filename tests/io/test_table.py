@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from facert.data import Controls, Source, Take
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.io.table import read_table, write_table
 

@@ -7,7 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import facert
-from facert.data import Controls, Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, OutputExistsError
 from facert.io.rig import read_rig, write_rig
 from facert.io.take import read_take, write_take

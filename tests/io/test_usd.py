@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facert.data import Mesh, Rig
+from facert.data.rig import Mesh, Rig
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.io.usd import write_usd
 from facert.morphs import Morphs, rig_morphs

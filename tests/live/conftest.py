@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from facert.data.names import ARKIT_NAMES
 from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import Frame, frame_pattern
 from facert.live.livelink import LiveLinkEncoder
-from facert.names import ARKIT_NAMES
 from facert.streaming import Streamed
 
 PATIENCE = 20.0

@@ -4,11 +4,11 @@ import socket
 
 import pytest
 
+from facert.data.names import ARKIT_SHAPES
 from facert.errors import InputError
 from facert.live.echo import refuse_echo
 from facert.live.endpoints import Address, open_receiver, open_sender
 from facert.live.frames import Counters, frame_pattern
-from facert.names import ARKIT_SHAPES
 
 
 def is_refused(listen, host, beside=0, kind="vmc"):

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from facert.data.names import ARKIT_SHAPES
 from facert.live.frames import BadPacketError
 from facert.live.ifacialmocap import IFacialMocapDecoder
-from facert.names import ARKIT_SHAPES
 
 
 def packet(separator="-", order=ARKIT_SHAPES):

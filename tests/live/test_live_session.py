@@ -5,10 +5,10 @@ import pytest
 from pylivelinkface import FaceBlendShape, PyLiveLinkFace
 from pythonosc.udp_client import SimpleUDPClient
 
+from facert.data.names import ARKIT_SHAPES
 from facert.live.endpoints import Address, open_receiver, open_sender
 from facert.live.frames import frame_pattern
 from facert.live.loop import Limits, Session
-from facert.names import ARKIT_SHAPES
 from facert.streaming import Streamed
 
 

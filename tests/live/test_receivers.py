@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from facert.data.names import ARKIT_NAMES
 from facert.errors import InputError
 from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import frame_pattern
 from facert.live.livelink import PACKET_NAMES
 from facert.live.osc import message
 from facert.live.receivers import TOLD, TakeReceiver
-from facert.names import ARKIT_NAMES
 
 
 def test_frames_come_in_order_with_their_values_and_times(receiver, phone, collect):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Controls
+from facert.data.take import Controls
 from facert.errors import InputError, OutputExistsError
 from facert.live.frames import Frame, frame_pattern
 from facert.live.recording import Recordings

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import facert
+from facert.data.normalisation import Normalisation
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.one_frame import BlendFrame, FactorFrame, ProcessBank
-from facert.normalisation import Normalisation
 from facert.settings import Settings
 
 EXACT = 1e-10

@@ -13,7 +13,8 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed")
 
 import facert
-from facert.data import Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Take
 from facert.pages.performance import Performance
 from facert.pages.pose_page import PosePage
 from facert.pages.server import address, page_server

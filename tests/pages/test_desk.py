@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Controls
+from facert.data.take import Controls
 from facert.pages.desk import KEPT, Desk, slider_bounds
 from facert.posing.pose import known_poses
 

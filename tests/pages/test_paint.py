@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from facert.data import Mesh
+from facert.data.rig import Mesh
 from facert.pages.paint import LEVELS, MOST, Scale, heat, skin
 from facert.pages.stage import piece_of
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Controls, Rig
+from facert.data.rig import Rig
+from facert.data.take import Controls
 from facert.errors import InputError
 from facert.pages.performance import Performance, highest, retargeted
 

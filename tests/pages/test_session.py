@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Controls, Rig
+from facert.data.rig import Rig
+from facert.data.take import Controls
 from facert.errors import InputError
 from facert.pages.session import Session, character_controls, output_beside
 

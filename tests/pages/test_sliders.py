@@ -1,4 +1,4 @@
-from facert.names import ARKIT_SHAPES, control_groups
+from facert.data.names import ARKIT_SHAPES, control_groups
 from facert.pages.sliders import UNFOLDED, unfolded_groups
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facert.data import Controls, Rig, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
 from facert.errors import InputError
 from facert.evaluation.summary import Row
 from facert.report.evaluation import read_evaluation

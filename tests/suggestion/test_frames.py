@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import facert
-from facert.data import Source, Take
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.suggestion import frames as frames_module
 from facert.suggestion.frames import APART, suggest_frames

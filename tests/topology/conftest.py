@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facert.data import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 
 def grid_mesh(rows: int = 9, columns: int = 8, seed: int = 0) -> tuple[FloatArray, IntArray]:

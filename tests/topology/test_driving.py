@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from facert.capture import simulate_capture
-from facert.data import Source
+from facert.data.take import Source
 from facert.errors import InputError
 from facert.io.formats import read_rig_file, read_take_file
 from facert.topology.driving import METHODS, FaceDriver

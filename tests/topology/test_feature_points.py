@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from facert.data import Mesh, Source, Take
+from facert.data.rig import Mesh
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.topology.feature_points import feature_points
 from facert.topology.placement import (

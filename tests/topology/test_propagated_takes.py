@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.data import Controls, Source, Take
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate

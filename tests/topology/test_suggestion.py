@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.topology.driving import FaceDriver, smooth_energy
 from facert.topology.solution import Elimination

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Rig
+from facert.data.rig import Rig
 from facert.topology.suggestion import suggest_points
 from facert.topology.symmetry import mirror_vertices
 

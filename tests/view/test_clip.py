@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from facert.data import Mesh, MeshSequence
+from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError
 from facert.view.clip import CAPTION, draw_clip, sampled_frames
 from facert.view.faces import Face, choose_frames, frame_faces, outline, require_part

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facert.data import Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.view.contact import actor_face, contact_sheet
 

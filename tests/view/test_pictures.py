@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Controls, Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.geometry import vertex_normals
 from facert.view.faces import choose_frames, control_settings

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from facert.data import Controls, Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 
 MATRICES = arrays.arrays(

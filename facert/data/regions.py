@@ -167,6 +167,8 @@ def _names(value: Any, field: str) -> tuple[str, ...]:
 
 
 def _spelled(wanted: Sequence[str], among: Sequence[str], field: str) -> tuple[str, ...]:
-    from facert.names import match  # brings NumPy, which the settings and `--help` can do without
+    from facert.data.names import (
+        match,  # brings NumPy, which the settings and `--help` can do without
+    )
 
     return tuple(among[index] for index in match(wanted, among, field))

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from facert.data import Rig, Take
+from facert.data.labelling import Poses, labelled
+from facert.data.name_map import renamed
+from facert.data.resampling import resampled
+from facert.data.rig import Rig
+from facert.data.take import Take
+from facert.data.timecode import timecode
+from facert.data.units import with_units, with_up_axis
 from facert.errors import InputError
-from facert.labelling import Poses, labelled
-from facert.name_map import renamed
-from facert.resampling import resampled
-from facert.timecode import timecode
-from facert.units import with_units, with_up_axis
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Changes:
     Parameters
     ----------
     names : mapping
-        From names in the file to new ones, see `facert.name_map.renamed`.
+        From names in the file to new ones, see `facert.data.name_map.renamed`.
     poses : Poses, optional
         Labels to add, by the frames and times of the file.
     fps : float, optional

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.normalisation import Normalisation
 
 
 def rows(seed=0):

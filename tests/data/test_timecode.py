@@ -2,8 +2,8 @@
 
 import pytest
 
+from facert.data.timecode import timecode
 from facert.io.livelink import format_timecode, parse_timecode
-from facert.timecode import timecode
 
 
 @pytest.mark.parametrize(

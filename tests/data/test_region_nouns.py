@@ -3,7 +3,7 @@
 import pytest
 
 from facert import InputError, Settings
-from facert.regions.nouns import MOST, Region, Regions
+from facert.data.regions import MOST, Region, Regions
 
 TABLES = {
     "brows": {"markers": ["browL", "browR"], "controls": ["browUp", "sneer"]},

@@ -4,8 +4,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from facert.data import Controls, Rig, Source, Take
-from facert.inspection import Gap, summarise
+from facert.data.rig import Rig
+from facert.data.summary import Gap, summarise
+from facert.data.take import Controls, Source, Take
 
 
 def make_take():

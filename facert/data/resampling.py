@@ -13,9 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data import FloatArray, IntArray, Source, Take
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.errors import InputError
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

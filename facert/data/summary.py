@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import BoolArray, FloatArray, MeshSequence, Rig, Source, Take
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.rig import MeshSequence, Rig
+from facert.data.take import Source, Take
 
 STILL = 1e-6
 """A channel is active when its range exceeds this share of the widest range of all channels."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.arrays import checked_names
-from facert.data import Controls, FloatArray, IntArray, Rig, Take
+from facert.data.arrays import FloatArray, IntArray, checked_names
+from facert.data.names import match, shape_drivers
+from facert.data.resampling import nearest_frames
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
+from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.names import match, shape_drivers
-from facert.resampling import nearest_frames
-from facert.wording import plural
 
 log = logging.getLogger("facert")
 

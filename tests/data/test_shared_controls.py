@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data import Controls, Source, Take
+from facert.data.shared_controls import shared_controls
+from facert.data.take import Controls, Source, Take
 from facert.metrics import compare
-from facert.shared_controls import shared_controls
 
 
 def take(params, names):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from facert.arrays import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 
 DAMAGED = "The model file is damaged: train it again."

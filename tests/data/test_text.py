@@ -2,7 +2,7 @@
 
 import pytest
 
-from facert.wording import plural
+from facert.data.text import plural
 
 
 @pytest.mark.parametrize(

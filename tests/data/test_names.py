@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from facert.errors import InputError
-from facert.names import (
+from facert.data.names import (
     ARKIT_ANGLES,
     ARKIT_NAMES,
     ARKIT_SHAPES,
@@ -19,6 +18,7 @@ from facert.names import (
     nearest,
     shape_drivers,
 )
+from facert.errors import InputError
 
 
 def spellings(name):

@@ -2,8 +2,8 @@
 
 import pytest
 
+from facert.data.ranges import parse_frames
 from facert.errors import InputError
-from facert.ranges import parse_frames
 
 
 def test_a_range_of_frames_is_all_of_them():

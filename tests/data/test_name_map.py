@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facert.data import Controls, Rig, Source, Take
+from facert.data.name_map import renamed
+from facert.data.rig import Rig
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.name_map import renamed
 
 SOURCE = Source(np.zeros((2, 3)), ("Mouth_Open", "Blink_L", "Blink_R"), np.ones((2, 3)))
 TAKE = Take([0, 1], SOURCE, Controls(("jaw", "lids"), [[0, 1], [0, 2]]), np.zeros((2, 2)))

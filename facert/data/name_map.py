@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from facert.data import Controls, Rig, Take
+from facert.data.names import NameIndex, nearest
+from facert.data.rig import Rig
+from facert.data.take import Controls, Take
 from facert.errors import InputError
-from facert.names import NameIndex, nearest
 
 
 def renamed(found: Take | Rig, names: Mapping[str, str]) -> Take | Rig:

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from facert.data import Rig, Source, Take
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
+from facert.data.units import METRES, with_units, with_up_axis
 from facert.errors import InputError
-from facert.units import METRES, with_units, with_up_axis
 
 RNG = np.random.default_rng(0)
 MARKERS = Source(RNG.normal(size=(2, 3, 3)), ("a", "b", "c"), RNG.random((2, 3, 3)))

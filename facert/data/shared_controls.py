@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from facert.data import Controls, Take
+from facert.data.names import NameIndex
+from facert.data.take import Controls, Take
+from facert.data.text import plural
 from facert.errors import InputError
-from facert.names import NameIndex
-from facert.wording import plural
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data import FloatArray
+from facert.data.arrays import FloatArray
 from facert.errors import InputError
 
 # Less motion than this, relative to the largest coordinate, is rounding.

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data import Controls, Source, Take
+from facert.data.resampling import resampled
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.resampling import resampled
 
 NAMES = ("a", "b")
 

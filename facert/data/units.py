@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data import FloatArray, Rig, Source, Take
+from facert.data.arrays import FloatArray
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.errors import InputError
 
 log = logging.getLogger("facert")

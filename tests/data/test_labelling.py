@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.data import Rig, Source, Take
+from facert.data.labelling import Poses, labelled, poses_of, weights_as_poses
+from facert.data.rig import Rig
+from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.labelling import Poses, labelled, poses_of, weights_as_poses
 
 TAKE = Take(np.arange(10) / 30, Source(np.ones((10, 1, 3)), ("m",)), fps=30.0)
 VALUES = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])

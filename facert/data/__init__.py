@@ -1,0 +1,1 @@
+"""What facert works on: takes, rigs, their names, units and time; plain checked arrays."""

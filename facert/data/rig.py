@@ -1,0 +1,164 @@
+"""Meshes, meshes in motion, and rigs.
+
+Plain frozen dataclasses, checked when they are made, like those of `facert.data.take`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data.arrays import (
+    FloatArray,
+    IntArray,
+    checked_colours,
+    checked_names,
+    float_array,
+    frozen,
+    require_plain,
+    require_time,
+    set_fields,
+)
+from facert.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in space.
+
+    Parameters
+    ----------
+    vertices : array, shape (V, 3)
+        In `units`.
+    faces : array of int, shape (F, 3)
+        Triangles, anticlockwise as seen from outside.
+    units : str
+        Unit of length; empty when unknown.
+    colours : array, shape (V, 3), optional
+        Red, green and blue of every vertex, 0 to 1; for pictures only.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes, numbers that are not finite, or faces that name no vertex.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    units: str = ""
+    colours: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        vertices = float_array(self.vertices, "/neutral")
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise InputError("/neutral", "(V, 3)", f"{vertices.shape}", "Give vertex positions.")
+        if not np.isfinite(vertices).all():
+            raise InputError("/neutral", "finite numbers", "NaN or infinity", "Check the export.")
+        require_plain(self.units, "attribute units")
+        faces = np.asarray(self.faces)
+        if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+            raise InputError(
+                "/faces", "integers (F, 3)", f"{faces.dtype} {faces.shape}", "Give triangles."
+            )
+        if faces.size and not (0 <= faces.min() and faces.max() < len(vertices)):
+            raise InputError(
+                "/faces",
+                f"vertex indices 0 to {len(vertices) - 1}",
+                f"{faces.min()} to {faces.max()}",
+                "Check the export.",
+            )
+        colours = checked_colours(self.colours, len(vertices))
+        set_fields(self, vertices=frozen(vertices), faces=frozen(faces.astype(np.int64)))
+        set_fields(self, colours=colours)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSequence:
+    """A mesh in motion, whose frames are fetched when they are needed: it may be large.
+
+    Parameters
+    ----------
+    neutral : Mesh
+        Rest pose.
+    time : array, shape (T,)
+        Seconds, rising.
+    fetch : callable
+        From frame numbers, shape (n,), to vertices (n, V, 3); NaN where a frame has no pose.
+    fps : float
+        Nominal frames a second.
+    """
+
+    neutral: Mesh
+    time: FloatArray
+    fetch: Callable[[IntArray], FloatArray]
+    fps: float = 30.0
+
+    def __post_init__(self) -> None:
+        time = float_array(self.time, "/time")
+        require_time(time, len(time), self.fps)
+        set_fields(self, time=frozen(time))
+
+    def __len__(self) -> int:
+        """Number of frames T."""
+        return len(self.time)
+
+    def batches(self, size: int = 64) -> Iterator[FloatArray]:
+        """All frames in order as vertices (n, V, 3), at most `size` at once."""
+        for start in range(0, len(self), size):
+            yield self.fetch(np.arange(start, min(start + size, len(self))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A face mesh with linear shapes: vertices = neutral + sum_p params_p * shapes_p.
+
+    Parameters
+    ----------
+    neutral : array, shape (V, 3)
+        Rest pose, in `units`.
+    shapes : array, shape (P, V, 3)
+        Displacement of every vertex when a control is 1.
+    names : sequence of str, length P
+        The controls.
+    faces : array of int, shape (F, 3)
+        Triangles.
+    units : str
+        Unit of length; empty when unknown.
+    colours : array, shape (V, 3), optional
+        Red, green and blue of every vertex, 0 to 1; for pictures only.
+    """
+
+    neutral: FloatArray
+    shapes: FloatArray
+    names: tuple[str, ...]
+    faces: IntArray
+    units: str = ""
+    colours: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        mesh = Mesh(self.neutral, self.faces, self.units, self.colours)
+        shapes = float_array(self.shapes, "/shapes")
+        if shapes.shape[1:] != mesh.vertices.shape:
+            raise InputError(
+                "/shapes",
+                f"(P, {len(mesh.vertices)}, 3)",
+                f"{shapes.shape}",
+                "Give one displacement a control and vertex.",
+            )
+        if not np.isfinite(shapes).all():
+            raise InputError("/shapes", "finite numbers", "NaN or infinity", "Check the export.")
+        names = checked_names(self.names, len(shapes), "/names")
+        set_fields(self, neutral=mesh.vertices, faces=mesh.faces, colours=mesh.colours)
+        set_fields(self, shapes=frozen(shapes), names=names)
+
+    @property
+    def mesh(self) -> Mesh:
+        """The rest pose alone."""
+        return Mesh(self.neutral, self.faces, self.units, self.colours)
+
+    def deform(self, params: FloatArray) -> FloatArray:
+        """Vertices (T, V, 3) for parameters (T, P)."""
+        flat = self.shapes.reshape(len(self.shapes), -1)
+        return self.neutral + (np.asarray(params) @ flat).reshape(-1, *self.neutral.shape)
