@@ -29,7 +29,7 @@ from facert.demo.expressions import ACTIVATIONS
 from facert.demo.head import make_head
 from facert.demo.markers import marker_vertices
 from facert.io.glb import write_glb
-from facert.morphs import Morphs
+from facert.mesh.morphs import Morphs
 
 FPS = 30.0
 SECONDS = {"recording": 20.0, "shot": 8.0}

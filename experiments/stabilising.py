@@ -24,8 +24,8 @@ from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Source, Take
 from facert.cleaning.stabilisation import stabilise
 from facert.data.arrays import FloatArray
+from facert.mesh.rigid import RigidMotion, align
 from facert.metrics import rms
-from facert.rigid import RigidMotion, align
 
 CHOSEN = ("ForeHead_M", "ForeHead_L", "ForeHead_R", "NoseTop")
 OPTICAL = {"optical_cheeks": "cheeks", "optical_eyebrows": "eyebrows"}

@@ -13,8 +13,8 @@ import facert
 from facert.data.arrays import FloatArray
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import read_tensors, write_tensors
-from facert.optim.base import State
-from facert.optim.monitor import Monitor, Progress
+from facert.models.optim.base import State
+from facert.models.optim.monitor import Monitor, Progress
 
 log = logging.getLogger(__name__)
 

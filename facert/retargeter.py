@@ -24,12 +24,12 @@ from facert.data.take import Controls, Source, SourceKind, Take
 from facert.errors import InputError, NumericalError
 from facert.handling import Handling
 from facert.methods.base import Method
+from facert.models.threads import threads_for
 from facert.neutral import at_rest, calibrated
 from facert.novelty import WORTH_TELLING, Novelty, Shown
 from facert.settings import Settings
 from facert.source_layout import SourceLayout
 from facert.streaming import ABSURD, RetargetStream
-from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
 

@@ -47,7 +47,7 @@ class Settings:
     sigma_c : float, optional
         Standard deviation of the measurement noise of the source, Eq. (13). It also sets the
         noise floor of the source view. By default expected from the data, see
-        `facert.gplvm.noise`.
+        `facert.methods.noise`.
     sigma_t : float, optional
         Standard deviation of the change from one cleaned frame to the next, Eq. (14); used when
         frames are mapped one after the other. By default that of the take.
@@ -60,8 +60,8 @@ class Settings:
         range of all poses in the take.
     likelihood : {"auto", "exact", "vfe", "fitc"}
         Of the shared models: exact, or through inducing latents by the variational bound or the
-        older FITC, see `facert.gp.sparse`; ``"auto"`` is exact for small sets and the bound for
-        large ones.
+        older FITC, see `facert.models.gp.sparse`; ``"auto"`` is exact for small sets and the bound
+        for large ones.
     inducing : int
         Inducing latents of a view, where there are any.
     optimizer : {"lbfgs", "scg"}

@@ -144,7 +144,7 @@ class RetargetStream:
         self._filter.look_ahead()
 
     def step(self, values: FloatArray) -> Streamed:
-        """Map one more frame; quickest within `facert.threads.threads_for` of one point.
+        """Map one more frame; quickest within `facert.models.threads.threads_for` of one point.
 
         Parameters
         ----------

@@ -14,11 +14,11 @@ from facert.data.normalisation import Normalisation
 from facert.data.ranges import parse_frames
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.gplvm.noise import with_noise
 from facert.methods import method_class
 from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
+from facert.methods.noise import with_noise
+from facert.models.optim.monitor import Monitor
 from facert.neutral import at_rest, most_neutral
-from facert.optim.monitor import Monitor
 from facert.posing.known import keep
 from facert.preparation import Prepared, prepare
 from facert.regions.layout import FaceData, method_for
@@ -47,7 +47,7 @@ def train(
     settings : Settings, optional
         By default those of the start, else a blend of experts, see `facert.methods.blend`.
     monitor : Monitor, optional
-        Watches the training; see `facert.gplvm.training`.
+        Watches the training; see `facert.models.gplvm.training`.
     start : Retargeter, optional
         What a shared model begins at, as after a label was added to the take that it was trained
         on: frames and poses that it knows keep their latent coordinates, and a few iterations

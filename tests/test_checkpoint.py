@@ -6,9 +6,9 @@ import pytest
 from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import write_tensors
-from facert.optim.base import State
-from facert.optim.monitor import Monitor, Progress
-from facert.optim.scg import SCG
+from facert.models.optim.base import State
+from facert.models.optim.monitor import Monitor, Progress
+from facert.models.optim.scg import SCG
 
 
 def bowl(x):

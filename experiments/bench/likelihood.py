@@ -1,7 +1,7 @@
 """Value and gradient of the likelihood, beside its LAPACK and BLAS calls and other libraries.
 
-Ours is measured as training calls it on the CPU (`facert.gplvm.energy`), and as a function of torch
-that is differentiated by torch, which costs some calls more.
+Ours is measured as training calls it on the CPU (`facert.models.gplvm.energy`), and as a function
+of torch that is differentiated by torch, which costs some calls more.
 
 GPy and GPyTorch are measured where they are installed. Each evaluates -log P(X|Z) of 120 columns
 and its gradient at so many positions in 8 dimensions; scikit-learn's gradient is that of the kernel
@@ -21,8 +21,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from experiments.bench.figure import Call, Figure, cpu_seconds
 from facert.data.arrays import FloatArray
-from facert.gp.lapack import value_and_gradient
-from facert.gp.likelihood import compact_factor, negative_log_likelihood
+from facert.models.gp.lapack import value_and_gradient
+from facert.models.gp.likelihood import compact_factor, negative_log_likelihood
 
 SIZES = (140, 240, 1000)
 TORCH, ALONE = "through torch", "LAPACK and BLAS alone"

@@ -16,7 +16,7 @@ from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.methods import make_method
 from facert.methods.base import Method
-from facert.threads import threads_for
+from facert.models.threads import threads_for
 
 METHODS = ("auto", "ssgplvm", "ssgpr", "gpr", "svr")
 PAPER = 30.0  # ms, the least that it says

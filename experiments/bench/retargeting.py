@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.bench.problem import bench_take, describe
 from facert import Settings, Source, Take, train
-from facert.threads import threads_for
+from facert.models.threads import threads_for
 
 NOISE, HIDDEN = 0.05, 0.3
 

@@ -27,11 +27,11 @@ from experiments.tracks import DATA, read_track
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.gplvm.lle import constraint_matrix
-from facert.gplvm.module import SharedGPLVM
-from facert.gplvm.sparse_module import SparseSharedGPLVM
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.models.gplvm.lle import constraint_matrix
+from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.sparse_module import SparseSharedGPLVM
 
 FOLDER = Path(__file__).resolve().parent
 COUNTS = (50, 100, 200, 500, 1000, 2000, 4000)

@@ -15,12 +15,12 @@ from experiments.bench.problem import bench_data
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.gplvm.noise import with_noise
 from facert.methods import make_method
 from facert.methods.base import Labelled, Report
+from facert.methods.noise import with_noise
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
-from facert.optim.base import Result
-from facert.optim.flat import FlatObjective
+from facert.models.optim.base import Result
+from facert.models.optim.flat import FlatObjective
 
 PAPER = [60.0]
 SCIPY = ("L-BFGS-B", "CG")

@@ -13,8 +13,8 @@ from facert.cleaning.motion import Motion
 from facert.cleaning.noise import capture_noise
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.normalisation import STILL, Normalisation
+from facert.models.threads import threads_for
 from facert.remembering import remembered
-from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
 

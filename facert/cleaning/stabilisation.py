@@ -19,7 +19,7 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.names import match
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.rigid import RigidMotion, align, determined, mean_motion
+from facert.mesh.rigid import RigidMotion, align, determined, mean_motion
 
 log = logging.getLogger(__name__)
 

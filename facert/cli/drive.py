@@ -166,7 +166,7 @@ def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bo
     from facert.data.units import in_metres
     from facert.io.glb import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
-    from facert.morphs import compact_morphs
+    from facert.mesh.morphs import compact_morphs
 
     if output.suffix.lower() != ".glb":
         write_mesh_sequence(sequence, output, overwrite)

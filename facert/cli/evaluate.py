@@ -101,7 +101,7 @@ def command(
     from facert.evaluation.protocol import Protocol, make_problem
     from facert.evaluation.summary import summarise
     from facert.io.formats import read_rig_file, targets_for
-    from facert.methods.device import find_device
+    from facert.models.device import find_device
     from facert.settings import Settings
 
     asked = Asked.of(_methods(methods), labels, unlabelled, repeats)

@@ -8,8 +8,8 @@ from types import TracebackType
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from facert.cli import console
-from facert.optim.base import State
-from facert.optim.monitor import Monitor
+from facert.models.optim.base import State
+from facert.models.optim.monitor import Monitor
 
 
 class ProgressBar(Monitor):

@@ -41,9 +41,9 @@ def command(
 
     The weights that drive the rig are the target of the take: its truth.
     """
-    from facert.capture import simulate_capture
     from facert.errors import reading
     from facert.io import formats
+    from facert.mesh.capture import simulate_capture
 
     formats.require_take_output(output, overwrite)
     chosen = None if vertices is None else _indices(vertices)

@@ -18,7 +18,7 @@ from facert.settings import OF_SHARED, Settings
 if TYPE_CHECKING:
     from facert.data.regions import Regions
     from facert.data.take import Take
-    from facert.optim.monitor import Monitor
+    from facert.models.optim.monitor import Monitor
     from facert.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")

@@ -17,8 +17,8 @@ from facert.errors import FacertError
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
 from facert.handling import AS_IT_IS
 from facert.metrics import Scores, score
+from facert.models.threads import threads_for
 from facert.settings import Settings
-from facert.threads import threads_for
 from facert.training import train
 
 

@@ -20,9 +20,9 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.units import in_metres
 from facert.errors import InputError
-from facert.geometry import vertex_normals
 from facert.io.atomic import replacing
-from facert.morphs import Morphs
+from facert.mesh.morphs import Morphs
+from facert.mesh.normals import vertex_normals
 
 _GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}

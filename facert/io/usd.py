@@ -15,7 +15,7 @@ import facert
 from facert.data.units import in_metres
 from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
-from facert.morphs import Morphs
+from facert.mesh.morphs import Morphs
 
 ENDINGS = (".usd", ".usda", ".usdc")
 

@@ -14,7 +14,7 @@ from facert.live.frames import Frame, Mapper, Output, Receiver, Sender
 from facert.live.meter import Meter
 from facert.live.recording import SourceRecord
 from facert.live.rhythm import Rhythm
-from facert.threads import threads_for
+from facert.models.threads import threads_for
 
 log = logging.getLogger("facert")
 

@@ -14,7 +14,7 @@ from facert.data.arrays import FloatArray
 from facert.data.names import NameIndex
 from facert.live.frames import Frame
 from facert.live.rest import RestWatch
-from facert.rigid import align, determined
+from facert.mesh.rigid import align, determined
 
 if TYPE_CHECKING:
     from facert.retargeter import Retargeter

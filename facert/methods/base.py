@@ -14,8 +14,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.optim.base import Result
-from facert.optim.monitor import Monitor
+from facert.models.optim.base import Result
+from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
 

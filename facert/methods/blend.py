@@ -1,7 +1,7 @@
 """`auto`: the default, a blend of experts weighted by how well each foretells the labels.
 
 No one method suits all captures. Where the rig follows the markers linearly, factors that all
-frames and poses share are hard to beat (`facert.factors`); where skin and rig do not, a
+frames and poses share are hard to beat (`facert.models.factors`); where skin and rig do not, a
 Gaussian process on the markers as they are is. `auto` has four experts:
 
 1. a Gaussian process with a linear term, on the source as it is;

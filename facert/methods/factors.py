@@ -1,9 +1,10 @@
 """Poses by the factors that frames and poses share, and what begins their search.
 
-The search of `facert.factors` begins at what two Gaussian processes on the labels say, on the
-source as it is and on half-whitened features: clean captures want the one, real markers the other,
-and their mean serves all. No closed form tells what factors would say of a label left out: they are
-learned five times more, each time without a fifth of the labels, and the processes with them.
+The search of `facert.models.factors` begins at what two Gaussian processes on the labels say, on
+the source as it is and on half-whitened features: clean captures want the one, real markers the
+other, and their mean serves all. No closed form tells what factors would say of a label left out:
+they are learned five times more, each time without a fifth of the labels, and the processes with
+them.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ import numpy as np
 from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.factors.censoring import Limits
-from facert.factors.model import Evidence, learn_factors
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import ranked_folds
 from facert.methods.regression import Map
 from facert.methods.ssgpr import Basis, FeatureProcess
+from facert.models.factors.censoring import Limits
+from facert.models.factors.model import Evidence, learn_factors
 
 HUGE = 1e150  # its square is finite
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from facert.data.arrays import FloatArray
-from facert.factors.censoring import LOG_2PI
 from facert.methods.frame_stream import Tell
+from facert.models.factors.censoring import LOG_2PI
 
 if TYPE_CHECKING:
     from facert.methods.blend import BlendMap
@@ -124,7 +124,7 @@ class ProcessBank:
 
 
 class FactorFrame:
-    """`FactorMap` for single frames, see `facert.factors.censoring.Limits.expected`.
+    """`FactorMap` for single frames, see `facert.models.factors.censoring.Limits.expected`.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ from facert.methods.base import (
     Stream,
     Unlabelled,
 )
-from facert.optim.monitor import Monitor
+from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
 WHOLE = 1e-9  # by which the weights of a control may miss 1

@@ -21,12 +21,12 @@ from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.gaps import Gaussian
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
-from facert.methods.device import find_device
 from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.metrics import rms
-from facert.optim.monitor import Monitor
+from facert.models.device import find_device
+from facert.models.optim.monitor import Monitor
+from facert.models.threads import threads_for
 from facert.settings import Settings
-from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
 

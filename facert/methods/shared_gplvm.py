@@ -1,9 +1,9 @@
 """The shared GPLVM as a retargeting method: semi-supervised (the paper's) and supervised.
 
 Small sets are trained exactly, as in the paper. Of large ones a core is, and the others are then
-joined to it (`facert.gplvm.staging`) in a model with inducing latents, in which they weigh no more
-than a hundred rows of each view (`facert.gplvm.sparse_module`): as every row counts alike in the
-exact model, hundreds without a partner overrule the labels, and the error rises.
+joined to it (`facert.models.gplvm.staging`) in a model with inducing latents, in which they weigh
+no more than a hundred rows of each view (`facert.models.gplvm.sparse_module`): as every row counts
+alike in the exact model, hundreds without a partner overrule the labels, and the error rises.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.gp.posterior import Predictor
-from facert.gp.sparse import ApproximationName
-from facert.gplvm.alignment import align, principal_components
-from facert.gplvm.device_mapping import (
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.methods.noise import with_noise
+from facert.methods.views import view_arrays, view_from
+from facert.models.device import find_device
+from facert.models.gp.posterior import Predictor
+from facert.models.gp.sparse import ApproximationName
+from facert.models.gplvm.alignment import align, principal_components
+from facert.models.gplvm.device_mapping import (
     DevicePredictor,
     DeviceSourceMapping,
     map_to_target_on,
 )
-from facert.gplvm.lle import constraint_matrix
-from facert.gplvm.module import SharedGPLVM
-from facert.gplvm.noise import with_noise
-from facert.gplvm.source_mapping import Mapped, Observation, SourceMapping
-from facert.gplvm.sparse_module import SparseSharedGPLVM
-from facert.gplvm.staging import Core, Start
-from facert.gplvm.target_mapping import map_to_target
-from facert.gplvm.training import train
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
-from facert.methods.device import find_device
-from facert.methods.views import view_arrays, view_from
-from facert.optim.base import Result
-from facert.optim.lbfgs import LBFGS
-from facert.optim.monitor import Monitor
-from facert.optim.scg import SCG
+from facert.models.gplvm.lle import constraint_matrix
+from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.source_mapping import Mapped, Observation, SourceMapping
+from facert.models.gplvm.sparse_module import SparseSharedGPLVM
+from facert.models.gplvm.staging import Core, Start
+from facert.models.gplvm.target_mapping import map_to_target
+from facert.models.gplvm.training import train
+from facert.models.optim.base import Result
+from facert.models.optim.lbfgs import LBFGS
+from facert.models.optim.monitor import Monitor
+from facert.models.optim.scg import SCG
+from facert.models.threads import threads_for
 from facert.settings import OptimiserName, Settings
-from facert.threads import threads_for
 
 log = logging.getLogger(__name__)
 

@@ -1,6 +1,6 @@
 """`ssgpr`: a Gaussian process on features of every frame, shrunk by every pose.
 
-The frames tell which directions of the source carry motion, see `facert.methods.features`; the
+The frames tell which directions of the source carry motion, see `facert.models.whitening`; the
 labels tell how poses follow, through a Gaussian process with a linear term on half-whitened
 features; the poses tell which predictions are likely, see `facert.methods.shrinkage`, where the
 leave-one-out errors of the process are known in closed form.
@@ -17,13 +17,13 @@ import numpy as np
 
 from facert.data.array_group import Arrays
 from facert.data.arrays import FloatArray
-from facert.gp.regression import maximise_likelihood
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.features import whitening
 from facert.methods.gpr import ProcessMap
 from facert.methods.one_frame import ShrunkFrame
 from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
+from facert.models.gp.regression import maximise_likelihood
+from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening
 # The search for the kernel takes time with the cube of the labels, and a few tell it as well.
@@ -39,7 +39,7 @@ class FeatureProcess(Map):
     centre : array, shape (d_x,)
         Mean of all frames.
     basis : array, shape (d_x, d_x)
-        Of the features, see `facert.methods.features.whitening`.
+        Of the features, see `facert.models.whitening.whitening`.
     mean : array, shape (d_y,)
         The pose expected before any label is seen.
     process : ProcessMap

@@ -13,8 +13,8 @@ import numpy as np
 from facert.data.array_group import DAMAGED, check_axes
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.gp.kernel import Kernel
-from facert.gp.posterior import Posterior, Predictor
+from facert.models.gp.posterior import Posterior, Predictor
+from facert.models.kernels import Kernel
 
 EXACT = {"latents": "nq", "observations": "nd", "kernel": "3"}
 SPARSE = {"latents": "mq", "whitener": "mm", "weights": "md", "kernel": "3"}

@@ -13,7 +13,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
-from facert.geometry import vertex_normals
+from facert.mesh.normals import vertex_normals
 from facert.pages.paint import LEVELS, MOST, Paint
 from facert.view.shade import frame_mesh
 

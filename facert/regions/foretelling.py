@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.methods.features import whitening
+from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening of the markers
 RIDGE = 0.1  # relative to the mean variance of their features

@@ -11,9 +11,9 @@ from facert.data.normalisation import Normalisation
 from facert.data.regions import Region, Regions
 from facert.data.take import Controls, Source
 from facert.errors import InputError
-from facert.gplvm.noise import with_noise
 from facert.methods import make_method
 from facert.methods.base import Method
+from facert.methods.noise import with_noise
 from facert.methods.regional import Layout, Regional
 from facert.regions.foretelling import left_out_errors
 from facert.settings import Settings

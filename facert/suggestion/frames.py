@@ -3,7 +3,7 @@
 A method knows the poses near those that it was shown. So the frames to pose are those that all
 frames of the take are near to: the k-medoids of their features (`facert.suggestion.medoids`). Some
 frames may be posed already; then the others are placed where these are far. Features are principal
-coordinates, at least half-whitened, so that a lid counts beside a jaw (`facert.methods.features`).
+coordinates, at least half-whitened, so that a lid counts beside a jaw (`facert.models.whitening`).
 
 Among frames that serve nearly as well, those that show most are preferred, as the rest of a frame
 is a guess; among frames that serve alike, those in which the face moves least. (To give up a little
@@ -23,7 +23,7 @@ from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind, Take
 from facert.errors import InputError
 from facert.gaps import fill_gaps
-from facert.methods.features import whitening
+from facert.models.whitening import whitening
 from facert.retargeter import Retargeter
 from facert.suggestion.medoids import LEAST_GAIN, Choice
 from facert.training_set import MIN_OBSERVED

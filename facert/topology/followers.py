@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.rigid import align
+from facert.mesh.rigid import align
 
 PULL = 1e-6  # towards no rotation
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_fill_holes, uniform_filter
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.geometry import vertex_normals
+from facert.mesh.normals import vertex_normals
 from facert.view.raster import Surface, rasterise
 
 CLAY = (0.80, 0.72, 0.66)

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from facert.data.take import Source, Take
-from facert.rigid import RigidMotion
+from facert.mesh.rigid import RigidMotion
 
 
 @pytest.fixture(scope="session")

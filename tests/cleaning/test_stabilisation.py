@@ -5,7 +5,7 @@ from facert.cleaning.stabilisation import stabilise, stable_markers
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.formats import read_take_file
-from facert.rigid import align
+from facert.mesh.rigid import align
 
 STABLE = [f"m{i}" for i in range(8)]
 

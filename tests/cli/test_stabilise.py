@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 import facert as api
 from facert.data.take import Source, Take
 from facert.io.take import read_take
-from facert.rigid import RigidMotion
+from facert.mesh.rigid import RigidMotion
 
 NAMES = tuple(f"m{i}" for i in range(8))
 

@@ -13,7 +13,7 @@ import facert
 from facert.data.arrays import FloatArray
 from facert.data.rig import Rig
 from facert.io.glb import write_glb
-from facert.morphs import Morphs
+from facert.mesh.morphs import Morphs
 
 pytestmark = [pytest.mark.real, pytest.mark.slow]
 FRAMES, SHOT, POSED = 900, 240, 20

@@ -15,7 +15,7 @@ from facert.errors import InputError, OutputExistsError
 from facert.io import formats
 from facert.io.glb import write_glb
 from facert.io.poses import read_poses
-from facert.morphs import rig_morphs
+from facert.mesh.morphs import rig_morphs
 
 TAKE = Take(time=[0.0, 0.5], source=Source(np.array([[0.0], [1.0]]), ["jawOpen"]), fps=2.0)
 RIG = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))

@@ -18,7 +18,7 @@ import trimesh
 from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, OutputExistsError
 from facert.io.glb import write_glb
-from facert.morphs import Morphs, compact_morphs
+from facert.mesh.morphs import Morphs, compact_morphs
 
 BALL = trimesh.creation.icosphere(2, radius=9.0)
 GREY = np.full(BALL.vertices.shape, 0.5)

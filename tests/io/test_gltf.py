@@ -20,7 +20,7 @@ from facert.io.gltf_take import holds_animation, read_gltf_take
 from facert.io.livelink import read_livelink
 from facert.io.mesh import read_mesh
 from facert.io.npz import read_npz_rig
-from facert.morphs import rig_morphs
+from facert.mesh.morphs import rig_morphs
 from facert.view.faces import control_settings
 
 BLENDER = Path(__file__).parent / "files" / "blender.glb"  # made and exported in Blender 5.0

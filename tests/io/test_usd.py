@@ -12,7 +12,7 @@ import pytest
 from facert.data.rig import Mesh, Rig
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.io.usd import write_usd
-from facert.morphs import Morphs, rig_morphs
+from facert.mesh.morphs import Morphs, rig_morphs
 
 pytest.importorskip("pxr", reason="needs usd-core: pip install 'facert[usd]'")
 from pxr import Gf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from facert.errors import InputError
-from facert.gplvm import staging
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.metrics import rms
-from facert.optim.monitor import Monitor
+from facert.models.gplvm import staging
+from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
 QUICK = {"latent_dim": 3, "neighbours": 5, "max_iterations": 40}

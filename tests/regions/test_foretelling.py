@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from facert.methods.features import whitening
+from facert.models.whitening import whitening
 from facert.regions.foretelling import FREE, POWER, RIDGE, left_out_errors
 
 

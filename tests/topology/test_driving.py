@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.capture import simulate_capture
 from facert.data.take import Source
 from facert.errors import InputError
 from facert.io.formats import read_rig_file, read_take_file
+from facert.mesh.capture import simulate_capture
 from facert.topology.driving import METHODS, FaceDriver
 from facert.topology.suggestion import suggest_points
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.geometry import vertex_normals
+from facert.mesh.normals import vertex_normals
 from facert.view.faces import choose_frames, control_settings
 from facert.view.plots import plot_controls
 from facert.view.raster import rasterise

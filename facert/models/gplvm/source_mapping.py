@@ -1,0 +1,360 @@
+"""Source mapping: the latent position and the cleaned source of an observed frame, Eqs. (9)-(17).
+
+For one frame, with x̃ observed with variance R_d per dimension (infinite where nothing was seen,
+and including the previous frame's pull, Eq. 14), the paper minimises over x and z
+
+    Σ_d (x_d - b_d)²/(2 R_d) + |x - μ(z)|²/(2 σ_p²(z)) + d_x/2 log σ_p²(z) + |z|²/2.
+
+It is quadratic in x, whose minimum x* = μ - σ_p² w ∘ (μ - b) with w_d = 1/(σ_p² + R_d) leaves
+
+    F(z) = 1/2 Σ_d w_d (μ_d - b_d)² + d_x/2 log σ_p² + |z|²/2,
+
+a problem in q dimensions. `solve` runs Newton's method with the exact Hessian on many frames at
+once, and `follow` on one after its predecessor (`facert.models.gplvm.frame_mapping`). Writing r = μ
+- b, s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s), a' = ∂a/∂s
+= Σ w³ r² - d_x/(2s²):
+
+    ∇F  = J (w r) + a g + z
+    ∇²F = J diag(w) Jᵀ + a' g gᵀ - u gᵀ - g uᵀ - 2 a G K⁻¹ Gᵀ + Σ_i e_i ∇²k_i + I,
+
+where u = J (w² r) and e = α (w r) - 2 a K⁻¹ k collects the curvature of the kernel itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data.arrays import BoolArray, FloatArray
+from facert.models.gp.posterior import PosteriorPoint, Predictor
+from facert.models.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping, Stand
+
+MAX_ITERATIONS = 200  # in all; most frames need three or four
+SHIFTED_DECREMENT = 1e-9  # a shifted step foretells little, however much is left
+SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
+CHUNK = 128  # frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is known of the source at B frames, in normalised units.
+
+    Parameters
+    ----------
+    mean : array, shape (B, d_x)
+        b, finite everywhere.
+    variance : array, shape (B, d_x)
+        R, its variance; infinite where nothing is known.
+    """
+
+    mean: FloatArray
+    variance: FloatArray
+
+    @classmethod
+    def of(cls, X: FloatArray, sigma_c: float, doubt: FloatArray | None = None) -> Observation:
+        """Frames (B, d_x) with measurement noise sigma_c, Eq. (13); NaN: not observed.
+
+        Numbers that were not measured but filled in have so much variance more, `doubt` (B, d_x).
+        """
+        seen = ~np.isnan(X)
+        variance = sigma_c**2 + (0.0 if doubt is None else np.nan_to_num(doubt))
+        return cls(np.where(seen, X, 0.0), np.where(seen, variance, np.inf))
+
+    def following(self, previous: FloatArray, sigma_t: float) -> Observation:
+        """With the pull of the previous cleaned frame, (B, d_x), added: Eq. (14)."""
+        precision = 1.0 / self.variance
+        total = precision + sigma_t**-2
+        mean = (precision * self.mean + sigma_t**-2 * previous) / total
+        return Observation(mean, 1.0 / total)
+
+    def __getitem__(self, rows: slice | FloatArray) -> Observation:
+        """Some of the frames."""
+        return Observation(self.mean[rows], self.variance[rows])
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Frames in latent space.
+
+    Parameters
+    ----------
+    z : array, shape (B, q)
+        z*, the latent positions.
+    x : array, shape (B, d_x)
+        x*, the most probable source.
+    hessian : array, shape (B, q, q)
+        ∇²F at z*, or a tiny last step before; its inverse is the covariance of z in the Laplace
+        approximation.
+    energy : array, shape (B,)
+        F(z*).
+    converged : array of bool, shape (B,)
+        Whether Newton's method met its tolerance.
+    stand : Stand, optional
+        Of a single frame that was followed: where its last step was taken from.
+    """
+
+    z: FloatArray
+    x: FloatArray
+    hessian: FloatArray
+    energy: FloatArray
+    converged: BoolArray
+    stand: Stand | None = None
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """F and its derivatives at B latent positions."""
+
+    energy: FloatArray
+    gradient: FloatArray
+    hessian: FloatArray
+
+
+class SourceMapping:
+    """Maps observed frames to the latent space of a trained source view.
+
+    Parameters
+    ----------
+    posterior : Predictor
+        The source view, X given Z.
+    """
+
+    chunk = CHUNK
+
+    def __init__(self, posterior: Predictor) -> None:
+        self.posterior = posterior
+        # F at every training latent is the search for a start: keep what does not change.
+        at = posterior.predict(posterior.Z)
+        self._train_means = np.hstack([0.5 * at.mean**2, -at.mean]).T.copy()
+        self._train_variance = float(at.variance.mean())
+        self._train_energy = 0.5 * posterior.columns * np.log(at.variance) + 0.5 * np.sum(
+            posterior.Z**2, axis=1
+        )
+        self._frame = FrameMapping(posterior)
+
+    def start(self, observed: Observation) -> FloatArray:
+        """The training latent of least energy for each frame, (B, q)."""
+        return np.asarray(self.posterior.Z[self._train_energies(observed).argmin(axis=1)])
+
+    def _train_energies(self, observed: Observation) -> FloatArray:
+        """About F at the training latents, (B, N)."""
+        # σ_p² varies little between them: its mean serves all.
+        w = 1.0 / (self._train_variance + observed.variance)
+        wb = w * observed.mean
+        of_frame = 0.5 * np.einsum("bd,bd->b", wb, observed.mean)
+        of_both = np.concatenate([w, wb], axis=1) @ self._train_means
+        return np.asarray(of_both + self._train_energy + of_frame[:, None])
+
+    def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
+        """F(z) for B frames, (B,)."""
+        return self._look(z, observed)[0]
+
+    def solve(self, observed: Observation, *starts: FloatArray) -> Mapped:
+        """Minimise F for each frame on its own, beginning at the best of the starts.
+
+        Parameters
+        ----------
+        observed : Observation
+            B frames.
+        *starts : array, shape (B, q)
+            Candidates beside the best training latent, e.g. the previous frame's z.
+
+        Returns
+        -------
+        Mapped
+            All frames; solved in chunks, so that memory stays bounded.
+        """
+        posterior = self.posterior
+        frames = min(self.chunk, len(observed.mean))
+        scratch = np.empty((frames * posterior.Z.shape[1], posterior.stacked.shape[1]))
+        chunks = [
+            self._newton(observed[rows], [start[rows] for start in starts], scratch)
+            for rows in (
+                slice(first, first + self.chunk)
+                for first in range(0, len(observed.mean), self.chunk)
+            )
+        ]
+        if len(chunks) == 1:
+            return chunks[0]
+        names = ("z", "x", "hessian", "energy", "converged")
+        z, x, hessian, energy, converged = (
+            np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in names
+        )
+        return Mapped(z, x, hessian, energy, converged)
+
+    def follow(
+        self, observed: Observation, previous: FloatArray, stand: Stand | None = None
+    ) -> Mapped:
+        """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
+
+        Parameters
+        ----------
+        observed : Observation
+            One frame.
+        previous : array, shape (1, q)
+            z of the frame before.
+        stand : Stand, optional
+            `Mapped.stand` of that frame, as good as its z and quicker.
+        """
+        frame, b, R = self._frame, observed.mean[0], observed.variance[0]
+        energies = self._train_energies(observed)[0]
+        least = energies.argmin()
+        stand = stand or frame.stand(previous[0])
+        found = frame.descend(stand, b, R, float(energies[least]))
+        if found is None:
+            nearest = self.posterior.Z[least]
+            if frame.energy(nearest, b, R) < frame.energy(stand.view.z, b, R):
+                stand = frame.stand(nearest)
+            found = frame.descend(stand, b, R)
+        if found is None:
+            return self.solve(observed, previous)
+        return Mapped(
+            found.z[None],
+            found.x[None],
+            found.hessian[None],
+            np.array([found.energy]),
+            np.array([True]),
+            found.stand,
+        )
+
+    def _newton(
+        self, observed: Observation, starts: list[FloatArray], scratch: FloatArray
+    ) -> Mapped:
+        """Newton's method; a shift appears only where a step is rejected, see `_step`."""
+        z = self._best_start(observed, starts)
+        at = self._expand(z, observed, scratch)
+        energy, gradient, hessian = at.energy, at.gradient, at.hessian
+        shift, last = np.zeros(len(z)), np.zeros_like(z)
+        converged = np.zeros(len(z), dtype=bool)
+
+        active = np.arange(len(z))
+        for _ in range(MAX_ITERATIONS):
+            step = _step(hessian[active], gradient[active], shift[active])
+            descent = np.einsum("bq,bq->b", gradient[active], step)
+            done = np.abs(descent) < np.where(shift[active] > 0.0, SHIFTED_DECREMENT, DECREMENT)
+            done[done] = ~_leave_saddles(hessian[active], step, descent, done)
+            converged[active[done]], last[active[done]] = True, step[done]
+            active, step, descent = active[~done], step[~done], descent[~done]
+            if not len(active):
+                break
+            at = self._expand(z[active] + step, observed[active], scratch)
+            fall = energy[active] - at.energy
+            foretold = -descent - 0.5 * np.einsum("bp,bpq,bq->b", step, hessian[active], step)
+            better = (descent < 0.0) & (fall >= -ROUNDING)
+            good = active[better]
+            z[good] += step[better]
+            energy[good], gradient[good] = at.energy[better], at.gradient[better]
+            hessian[good] = at.hessian[better]
+            shift[active] = _adapted(shift[active], better, fall, foretold)
+        end, x = self._look(z + last, observed)
+        return Mapped(z + last, x, hessian, end, converged)
+
+    def _look(self, z: FloatArray, observed: Observation) -> tuple[FloatArray, FloatArray]:
+        """F and x* at z (B, q)."""
+        at = self.posterior.predict(z)
+        w = 1.0 / (at.variance[:, None] + observed.variance)
+        r = at.mean - observed.mean
+        return _energy(z, at, w, r), at.mean - at.variance[:, None] * w * r
+
+    def _best_start(self, observed: Observation, starts: list[FloatArray]) -> FloatArray:
+        z = self.start(observed)
+        if not starts:
+            return z
+        candidates = np.stack([z, *starts])
+        energies = np.stack([self.energy(candidate, observed) for candidate in candidates])
+        return np.asarray(candidates[energies.argmin(axis=0), np.arange(len(z))])
+
+    def _expand(
+        self, z: FloatArray, observed: Observation, scratch: FloatArray | None = None
+    ) -> Expansion:
+        """F, ∇F and ∇²F at z (B, q), by the formulas at the head of this file."""
+        posterior = self.posterior
+        theta2 = posterior.kernel.inverse_width
+        d_x = posterior.columns
+        at = posterior.predict(z)
+        _, H, J = posterior.jacobians(at, scratch)
+
+        s = at.variance
+        w = 1.0 / (s[:, None] + observed.variance)
+        r = at.mean - observed.mean
+        wr = w * r
+        w2r = w * wr
+        a = -0.5 * np.einsum("bd,bd->b", wr, wr) + 0.5 * d_x / s
+        a_slope = np.einsum("bd,bd->b", w2r, wr) - 0.5 * d_x / s**2
+        g = -2.0 * np.einsum("bqn,bn->bq", H, at.whitened)
+        u = np.einsum("bqd,bd->bq", J, w2r)
+
+        gradient = np.einsum("bqd,bd->bq", J, wr) + a[:, None] * g + z
+
+        ek = (wr @ posterior.alpha.T - 2.0 * a[:, None] * posterior.solve(at)) * at.k
+        ug = u[:, :, None] * g[:, None, :]
+        hessian = (
+            (J * w[:, None, :]) @ J.transpose(0, 2, 1)
+            + a_slope[:, None, None] * g[:, :, None] * g[:, None, :]
+            - (ug + ug.transpose(0, 2, 1))
+            - (2.0 * a)[:, None, None] * (H @ H.transpose(0, 2, 1))
+            + theta2**2 * ((at.offsets * ek[:, :, None]).transpose(0, 2, 1) @ at.offsets)
+        )
+        diagonal = np.arange(z.shape[1])
+        hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
+        return Expansion(_energy(z, at, w, r), gradient, hessian)
+
+
+def _leave_saddles(
+    hessian: FloatArray, step: FloatArray, descent: FloatArray, done: BoolArray
+) -> BoolArray:
+    """Which of the frames that are done stand on a saddle; their steps are set to lead off it."""
+    try:
+        np.linalg.cholesky(hessian[done])
+        return np.zeros(np.count_nonzero(done), dtype=bool)
+    except np.linalg.LinAlgError:
+        pass  # one at least: look at all
+    values, vectors = np.linalg.eigh(hessian[done])
+    saddle = values[:, 0] < 0.0
+    rows = np.flatnonzero(done)[saddle]
+    # A fall of about 0.005 nats along the direction of negative curvature.
+    length = 0.1 / np.sqrt(-values[saddle, 0])
+    step[rows] = length[:, None] * vectors[saddle, :, 0]
+    descent[rows] = -DECREMENT
+    return saddle
+
+
+def _adapted(
+    shift: FloatArray, better: BoolArray, fall: FloatArray, foretold: FloatArray
+) -> FloatArray:
+    """The next shift: smaller where the quadratic model foretold the fall well, larger where not.
+
+    In a narrow curved valley a step may be better and yet far from what was foretold.
+    """
+    poor = ~better | (fall < 0.25 * foretold - ROUNDING)
+    well = better & (fall > 0.75 * foretold - ROUNDING)
+    raised = np.maximum(4.0 * shift, SHIFT)
+    lowered = np.where(shift > SHIFT, 0.25 * shift, 0.0)
+    return np.where(poor, raised, np.where(well, lowered, shift))
+
+
+def _step(hessian: FloatArray, gradient: FloatArray, shift: FloatArray) -> FloatArray:
+    """Newton's step -H⁻¹ g, (B, q); with a shift, -(|H| + shift h)⁻¹ g.
+
+    |H| has the eigenvalues' absolute values, so that the shifted step descends from a saddle as
+    well; h is the largest of them.
+    """
+    step: FloatArray = np.negative(np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0])
+    shifted = np.flatnonzero(shift)
+    if len(shifted):
+        values, vectors = np.linalg.eigh(hessian[shifted])
+        values = np.abs(values)
+        values += shift[shifted, None] * values.max(axis=1, keepdims=True)
+        along = np.einsum("bqk,bq->bk", vectors, gradient[shifted]) / values
+        step[shifted] = -np.einsum("bqk,bk->bq", vectors, along)
+    return step
+
+
+def _energy(z: FloatArray, at: PosteriorPoint, w: FloatArray, r: FloatArray) -> FloatArray:
+    energy: FloatArray = 0.5 * (
+        np.einsum("bd,bd,bd->b", w, r, r)
+        + r.shape[1] * np.log(at.variance)
+        + np.einsum("bq,bq->b", z, z)
+    )
+    return energy

@@ -1,0 +1,109 @@
+"""The training loop: advance, watch, checkpoint, until the objective no longer falls."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from facert.errors import InputError, NumericalError
+from facert.models.gplvm.module import SharedGPLVM
+from facert.models.optim.base import Optimiser, Result, State, Status
+from facert.models.optim.flat import FlatObjective
+from facert.models.optim.monitor import Monitor, Progress
+
+
+def train(
+    module: SharedGPLVM,
+    optimiser: Optimiser,
+    *,
+    tolerance: float,
+    max_iterations: int,
+    checkpoint_every: int,
+    fingerprint: str,
+    monitor: Monitor,
+    magnitude: float = 1.0,
+) -> Result:
+    """Minimise the module's output; its parameters are then the best that were found.
+
+    Parameters
+    ----------
+    module : SharedGPLVM
+        Begins at its present parameters, or at the monitor's checkpoint.
+    optimiser : Optimiser
+        How to descend.
+    tolerance : float
+        Relative decrease an iteration below which the run has converged.
+    max_iterations : int
+        Counted over all resumed runs.
+    checkpoint_every : int
+        Iterations between two checkpoints.
+    fingerprint : str
+        Identifies the problem: its data and its settings.
+    monitor : Monitor
+        Watches, keeps checkpoints, knows where an earlier run stopped.
+    magnitude : float
+        The decrease is taken relative to this at least: an objective that passes through zero is
+        no measure of itself.
+
+    Returns
+    -------
+    Result
+        Ctrl-C does not raise: it ends the run with status ``"interrupted"``.
+    """
+    began = time.perf_counter()
+    objective = FlatObjective(module)
+    progress = monitor.resume(fingerprint) or Progress(optimiser.start(objective, objective.vector))
+    if progress.state.x.shape != objective.vector.shape:
+        raise InputError(
+            "the checkpoint",
+            f"{objective.vector.shape} variables",
+            f"{progress.state.x.shape}",
+            "Train without --resume.",
+        )
+
+    def converged() -> bool:
+        value = max(abs(progress.state.value), 1.0)
+        return progress.converged(tolerance * max(magnitude / value, 1.0))
+
+    def watch(state: State) -> bool:
+        nonlocal progress
+        progress = Progress(state, (*progress.curve, state.value))
+        monitor.iteration(state)
+        return converged()
+
+    status: Status = "iteration limit"
+    try:
+        while progress.state.iterations < max_iterations:
+            left = max_iterations - progress.state.iterations
+            state = optimiser.advance(objective, progress.state, min(checkpoint_every, left), watch)
+            progress = replace(progress, state=state)
+            if converged():
+                status = "converged"
+                break
+            if state.stalled:
+                status = "stalled"
+                break
+            monitor.checkpoint(progress)
+    except KeyboardInterrupt:
+        status = "interrupted"
+        monitor.checkpoint(progress)
+    objective.vector = progress.state.x
+    if not progress.state.value < float("inf"):
+        raise NumericalError("training ended without a finite objective")
+    return Result(
+        value=progress.state.value,
+        gradient_norm=progress.state.gradient_norm,
+        iterations=progress.state.iterations,
+        evaluations=objective.evaluations,
+        seconds=time.perf_counter() - began,
+        status=status,
+        message=_MESSAGES[status],
+    )
+
+
+_MESSAGES: dict[Status, str] = {
+    "converged": "the objective no longer falls by the tolerance",
+    "iteration limit": "the iteration limit was reached before convergence",
+    "stalled": "no descent is possible within rounding",
+    "interrupted": "stopped by hand; the best state was kept",
+}

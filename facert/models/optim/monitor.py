@@ -1,0 +1,50 @@
+"""What watches a minimisation, and what a stopped one needs to go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from facert.models.optim.base import State
+
+# The relative change is averaged over so many iterations: one short step is not convergence.
+WINDOW = 5
+
+
+@dataclass(frozen=True)
+class Progress:
+    """All that a stopped run needs to go on.
+
+    Parameters
+    ----------
+    state : State
+        Of the optimiser.
+    curve : tuple of float
+        The objective after each iteration so far.
+    """
+
+    state: State
+    curve: tuple[float, ...] = field(default=())
+
+    def converged(self, tolerance: float) -> bool:
+        """Whether the relative decrease an iteration fell below the tolerance."""
+        if len(self.curve) <= WINDOW:
+            return False
+        fall = self.curve[-1 - WINDOW] - self.curve[-1]
+        return fall <= WINDOW * tolerance * max(abs(self.curve[-1]), 1.0)
+
+
+class Monitor:
+    """What watches a training run; this one does nothing.
+
+    Subclasses draw a progress bar, write checkpoints, log the curve.
+    """
+
+    def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  a hook
+        """Where an earlier run with this fingerprint stopped, or None to begin anew."""
+        return None
+
+    def iteration(self, state: State) -> None:
+        """Called after every iteration."""
+
+    def checkpoint(self, progress: Progress) -> None:
+        """Called every so many iterations, and when the run is interrupted."""

@@ -1,0 +1,81 @@
+"""The formulas on a torch device, against those in NumPy; on a GPU as well where there is one."""
+
+import numpy as np
+import pytest
+import torch
+
+from facert.models.gp.posterior import Posterior
+from facert.models.gplvm import device_mapping
+from facert.models.gplvm.device_mapping import (
+    DevicePredictor,
+    DeviceSourceMapping,
+    map_to_target_on,
+)
+from facert.models.gplvm.source_mapping import Observation, SourceMapping
+from facert.models.gplvm.target_mapping import map_to_target
+from facert.models.kernels import Kernel
+
+DEVICES = [
+    "cpu",
+    pytest.param(
+        "cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+    ),
+]
+
+
+def make_view(columns, noise, seed):
+    rng = np.random.default_rng(seed)
+    Z = np.random.default_rng(0).normal(size=(30, 3))
+    return Posterior(Z, np.sin(Z @ rng.normal(size=(3, columns))), Kernel(1.3, 0.4, noise))
+
+
+@pytest.fixture(scope="module")
+def source():
+    return make_view(12, 0.01, 1)
+
+
+@pytest.fixture(scope="module")
+def observed(source):
+    rng = np.random.default_rng(2)
+    frames = source.predict(rng.normal(size=(40, 3))).mean + rng.normal(0.0, 0.05, (40, 12))
+    frames[rng.random(frames.shape) < 0.3] = np.nan
+    return Observation.of(frames, 0.05)
+
+
+@pytest.fixture(params=DEVICES)
+def device(request):
+    return torch.device(request.param)
+
+
+def test_the_objective_and_its_derivatives_are_the_same(source, observed, device):
+    z = np.random.default_rng(3).normal(size=(40, 3))
+    plain, there = SourceMapping(source), DeviceSourceMapping(source, device)
+    here, away = plain._expand(z, observed), there._expand(z, observed)
+    for name in ("energy", "gradient", "hessian"):
+        np.testing.assert_allclose(getattr(away, name), getattr(here, name), rtol=1e-9, atol=1e-9)
+    for ours, theirs in zip(there._look(z, observed), plain._look(z, observed), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(there.start(observed), plain.start(observed))
+
+
+@pytest.mark.parametrize("chunk", [7, 4096])
+def test_frames_end_at_the_same_optimum_however_they_are_cut(
+    source, observed, device, chunk, monkeypatch
+):
+    monkeypatch.setattr(DeviceSourceMapping, "chunk", chunk)
+    plain = SourceMapping(source).solve(observed)
+    there = DeviceSourceMapping(source, device).solve(observed)
+    assert there.converged.all()
+    for name in ("z", "x", "energy"):
+        ours, theirs = getattr(there, name), getattr(plain, name)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("chunk", [7, 4096])
+def test_poses_and_their_spread_are_the_same(source, observed, device, chunk, monkeypatch):
+    monkeypatch.setattr(device_mapping, "CHUNK", chunk)
+    target = make_view(5, 0.05, 4)
+    mapped = SourceMapping(source).solve(observed)
+    there = map_to_target_on(DevicePredictor(target, device), mapped)
+    for ours, theirs in zip(there, map_to_target(target, mapped), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)

@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+import torch
+
+from facert.models.gplvm.lle import constraint_matrix
+from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.sparse_module import (
+    MOST_COUNTED,
+    SparseSharedGPLVM,
+    inducing_rows,
+    row_weights,
+)
+
+LABELLED, SOURCE, TARGET, LATENT = 5, 12, 8, 2
+FLOORS = 0.01, 0.05
+
+
+@pytest.fixture
+def views():
+    rng = np.random.default_rng(0)
+    return rng.normal(size=(LABELLED + SOURCE, 6)), rng.normal(size=(LABELLED + TARGET, 3))
+
+
+@pytest.fixture
+def Z():
+    return np.random.default_rng(1).normal(size=(LABELLED + SOURCE + TARGET, LATENT))
+
+
+def both(X, Y, Z, inducing, **options):
+    M = constraint_matrix(X, Y, LABELLED, 3)
+    return (
+        SharedGPLVM(X, Y, LABELLED, M, Z, *FLOORS),
+        SparseSharedGPLVM(X, Y, LABELLED, M, Z, *FLOORS, inducing=inducing, **options),
+    )
+
+
+@pytest.mark.parametrize("approximation", ["vfe", "fitc"])
+def test_where_all_rows_are_inducing_energy_and_posteriors_are_those_of_the_exact_model(
+    views, Z, approximation
+):
+    exact, sparse = both(*views, Z, 50, approximation=approximation)
+    torch.testing.assert_close(sparse(), exact(), rtol=1e-8, atol=0.0)
+    z = np.random.default_rng(2).normal(size=(4, LATENT))
+    for one, other, view in (
+        (exact.source_posterior, sparse.source_posterior, views[0]),
+        (exact.target_posterior, sparse.target_posterior, views[1]),
+    ):
+        np.testing.assert_allclose(
+            other(view).predict(z).mean, one(view).predict(z).mean, atol=1e-6
+        )
+
+
+def test_inducing_latents_are_trained_with_the_rest(views, Z):
+    _, sparse = both(*views, Z, 7)
+    shapes = {name: tuple(p.shape) for name, p in sparse.named_parameters()}
+    assert shapes["inducing_x"] == shapes["inducing_y"] == (7, LATENT)
+    sparse().backward()
+    assert all(p.grad.abs().max() > 0 for p in sparse.parameters())
+
+
+def test_each_view_has_its_own_rows_and_the_labelled_ones(views, Z):
+    """A row of one view does not pull at those of the other but by the prior."""
+    _, sparse = both(*views, Z, 7)
+    source, target = slice(LABELLED, LABELLED + SOURCE), slice(LABELLED + SOURCE, None)
+    by_source, by_target = (
+        torch.autograd.grad(energy, sparse.Z)[0]
+        for energy in (sparse.source_energy(), sparse.target_energy())
+    )
+    assert (by_source[target] == 0).all()
+    assert (by_target[source] == 0).all()
+    assert (by_source[:LABELLED] != 0).all()
+    assert (by_target[:LABELLED] != 0).all()
+
+
+def test_it_takes_over_the_kernels_of_a_trained_model(views, Z):
+    exact, sparse = both(*views, Z, 7)
+    with torch.no_grad():
+        exact.log_kernel_x.add_(0.3)
+        exact.log_kernel_y.sub_(0.2)
+    sparse.begin_with(exact.kernel_x, exact.kernel_y)
+    assert sparse.kernel_x.theta == pytest.approx(exact.kernel_x.theta, rel=1e-12)
+    assert sparse.kernel_y.theta == pytest.approx(exact.kernel_y.theta, rel=1e-12)
+
+
+def test_unlabelled_rows_weigh_as_much_as_so_many_at_most():
+    few, many = row_weights(40, 10), row_weights(5010, 10)
+    assert (few == 1.0).all()
+    assert (many[:10] == 1.0).all()
+    assert many[10:].sum().item() == pytest.approx(MOST_COUNTED)
+
+
+def test_inducing_latents_begin_at_labels_and_rows_spread_over_the_others():
+    rows = inducing_rows(rows=1000, labelled=20, count=50)
+    assert len(set(rows.tolist())) == 50
+    np.testing.assert_array_equal(rows[:20], np.arange(20))
+    assert len(inducing_rows(30, 20, 50)) == 30
+    assert len(inducing_rows(900, 800, 50)) == 50

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from facert.models.gplvm.alignment import align
+from facert.models.gplvm.lle import constraint_matrix
+from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, Start, spread
+from facert.models.gplvm.training import train
+from facert.models.optim.lbfgs import LBFGS
+from facert.models.optim.monitor import Monitor
+
+
+def test_rows_are_spread_evenly_and_differ():
+    np.testing.assert_array_equal(spread(3, 6, 9), [3, 4, 5])
+    np.testing.assert_array_equal(spread(10, 20, 4), [10, 12, 15, 17])
+    assert spread(5, 5, 4).size == 0
+
+
+def test_a_core_has_labels_in_front_and_so_many_others_of_each_view():
+    X, Y = np.zeros((500, 4)), np.zeros((90, 3))
+    core = Core.of(X, Y, labelled=20)
+    assert (len(core.rows_x), len(core.rows_y)) == (20 + CORE_ALONE, 90)
+    for rows in (core.rows_x, core.rows_y):
+        np.testing.assert_array_equal(rows[:20], np.arange(20))
+        assert (np.diff(rows) > 0).all()
+    assert not core.is_all_of(X, Y)
+    assert Core.of(X[:120], Y, labelled=20).is_all_of(X[:120], Y)
+
+
+def test_of_very_many_labels_a_core_has_some():
+    core = Core.of(np.zeros((3000, 4)), np.zeros((3000, 3)), labelled=3000)
+    assert core.labelled == len(core.rows_x) == len(core.rows_y) == CORE_LABELS
+
+
+LABELLED = 12
+
+
+@pytest.fixture(scope="module")
+def views():
+    """Two views of the plane, 180 rows alone in each, the rows in no order."""
+    rng = np.random.default_rng(0)
+    latent = rng.uniform(-1, 1, size=(LABELLED + 360, 2))
+    X = np.tanh(latent @ rng.normal(size=(2, 12)))
+    Y = np.sin(latent @ rng.normal(size=(2, 8)))
+    return X[: LABELLED + 180], np.delete(Y, slice(LABELLED, LABELLED + 180), axis=0)
+
+
+@pytest.fixture(scope="module")
+def trained(views):
+    X, Y = views
+    core = Core.of(X, Y, LABELLED)
+    X, Y = X[core.rows_x], Y[core.rows_y]
+    M = constraint_matrix(X, Y, LABELLED, 6)
+    module = SharedGPLVM(X, Y, LABELLED, M, align(M, 2), 1e-3, 1e-3)
+    train(
+        module,
+        LBFGS(),
+        tolerance=1e-4,
+        max_iterations=60,
+        checkpoint_every=60,
+        fingerprint="",
+        monitor=Monitor(),
+    )
+    return core, module
+
+
+def test_rows_of_the_core_stay_and_the_others_are_placed_where_their_view_explains_them(
+    views, trained
+):
+    (X, Y), (core, module) = views, trained
+    posteriors = module.source_posterior(X[core.rows_x]), module.target_posterior(Y[core.rows_y])
+    Z = Start.at(*posteriors).latents(X, Y, LABELLED)
+    assert Z.shape == (LABELLED + 360, 2)
+    np.testing.assert_array_equal(Z[core.rows_x], module.latents_x)
+    Z_y = np.vstack([Z[:LABELLED], Z[len(X) :]])
+    np.testing.assert_array_equal(Z_y[core.rows_y], module.latents_y)
+    for Z_view, view, posterior in zip((Z[: len(X)], Z_y), (X, Y), posteriors, strict=True):
+        error = np.abs(posterior.predict(Z_view).mean - view)
+        assert error.mean() < 0.1 * view.std()
