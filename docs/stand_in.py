@@ -19,8 +19,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import facert
-from facert.cleaning.detection import without_faults
-from facert.cleaning.stabilisation import stabilise
 from facert.data.arrays import FloatArray
 from facert.demo import acting, actor_rig, character_rig
 from facert.demo.build import ACTOR
@@ -30,6 +28,8 @@ from facert.demo.head import make_head
 from facert.demo.markers import marker_vertices
 from facert.io.glb import write_glb
 from facert.mesh.morphs import Morphs
+from facert.preprocess.faults import without_faults
+from facert.preprocess.head_motion import stabilise
 
 FPS = 30.0
 SECONDS = {"recording": 20.0, "shot": 8.0}

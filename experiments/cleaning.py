@@ -23,13 +23,13 @@ from threadpoolctl import threadpool_limits
 from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
-from facert.cleaning.estimate import estimate
-from facert.cleaning.interpolation import interpolated
-from facert.cleaning.noise import capture_noise
 from facert.data.arrays import BoolArray, FloatArray
 from facert.data.normalisation import Normalisation
-from facert.gaps import Gaussian
 from facert.metrics import rms
+from facert.preprocess.gaps import Gaussian
+from facert.preprocess.motion.estimate import estimate
+from facert.preprocess.motion.interpolation import interpolated
+from facert.preprocess.motion.noise import capture_noise
 
 KINDS, SHARES, NOISES = ("scattered", "bursts", "region"), (0.1, 0.2, 0.4), (0.0, 0.05, 0.1)
 BURST, PERIOD = (5, 60), (20, 90)  # frames

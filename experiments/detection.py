@@ -23,8 +23,8 @@ from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, read_track
 from facert import Source
-from facert.cleaning.detection import find_faults
 from facert.data.arrays import BoolArray, FloatArray
+from facert.preprocess.faults import find_faults
 
 RAW = ("cheeks", "eyebrows")
 SPIKES, HELD, SWAPPED = (0.1, 0.2, 0.5, 1.0, 3.0), (2, 3, 5, 10, 30), (1, 2, 5, 20, 100)

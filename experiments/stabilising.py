@@ -22,10 +22,10 @@ from experiments.grid import RESULTS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Source, Take
-from facert.cleaning.stabilisation import stabilise
 from facert.data.arrays import FloatArray
 from facert.mesh.rigid import RigidMotion, align
 from facert.metrics import rms
+from facert.preprocess.head_motion import stabilise
 
 CHOSEN = ("ForeHead_M", "ForeHead_L", "ForeHead_R", "NoseTop")
 OPTICAL = {"optical_cheeks": "cheeks", "optical_eyebrows": "eyebrows"}

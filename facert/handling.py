@@ -24,7 +24,7 @@ class Handling:
         Standard deviation of the capture noise, in the take's units; by default estimated from the
         take; a live stream begins with that of the training take and measures its own.
     neutral : sequence of int, optional
-        Frames in which the actor rests; see `facert.neutral`.
+        Frames in which the actor rests; see `facert.preprocess.neutral`.
     adjustments : Adjustments, optional
         Of single controls.
     """

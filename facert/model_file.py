@@ -10,7 +10,6 @@ from typing import get_args
 import numpy as np
 
 import facert
-from facert.cleaning.motion import Motion
 from facert.data.array_group import check_axes
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
@@ -18,9 +17,10 @@ from facert.data.take import Controls, SourceKind
 from facert.errors import InputError, reading
 from facert.io.tensors import read_tensors, write_tensors
 from facert.methods import make_method
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.source_layout import SourceLayout
 from facert.retargeter import Retargeter
 from facert.settings import Settings
-from facert.source_layout import SourceLayout
 
 FORMAT = "facert-model"
 

@@ -21,9 +21,9 @@ from typing import Self
 
 import numpy as np
 
-from facert.cleaning.motion import Motion
 from facert.data.arrays import FloatArray
 from facert.data.take import SourceKind
+from facert.preprocess.motion.motion import Motion
 
 RIDGE = 0.1
 """λ: the smaller, the further posed frames are taken to reach beyond themselves."""

@@ -15,9 +15,6 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from facert.adjustments import Adjustments
-from facert.cleaning.detection import without_faults
-from facert.cleaning.estimate import FEWEST, estimate_if_it_moves, grid
-from facert.cleaning.motion import Motion
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, Source, SourceKind, Take
@@ -25,10 +22,13 @@ from facert.errors import InputError, NumericalError
 from facert.handling import Handling
 from facert.methods.base import Method
 from facert.models.threads import threads_for
-from facert.neutral import at_rest, calibrated
 from facert.novelty import WORTH_TELLING, Novelty, Shown
+from facert.preprocess.faults import without_faults
+from facert.preprocess.motion.estimate import FEWEST, estimate_if_it_moves, grid
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.neutral import at_rest, calibrated
+from facert.preprocess.source_layout import SourceLayout
 from facert.settings import Settings
-from facert.source_layout import SourceLayout
 from facert.streaming import ABSURD, RetargetStream
 
 log = logging.getLogger(__name__)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.adjustments import Adjustments
-from facert.cleaning.estimate import LEAST_NOISE
-from facert.cleaning.filtering import MotionFilter, NoiseMeter, Seen
-from facert.cleaning.watching import MarkerWatch
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.handling import Handling
 from facert.methods.base import Prediction
-from facert.neutral import Calibration
-from facert.source_layout import FramePicker
+from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.motion.estimate import LEAST_NOISE
+from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
+from facert.preprocess.neutral import Calibration
+from facert.preprocess.source_layout import FramePicker
 
 if TYPE_CHECKING:
     from facert.retargeter import Retargeter

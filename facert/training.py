@@ -18,16 +18,16 @@ from facert.methods import method_class
 from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
 from facert.methods.noise import with_noise
 from facert.models.optim.monitor import Monitor
-from facert.neutral import at_rest, most_neutral
 from facert.posing.known import keep
-from facert.preparation import Prepared, prepare
+from facert.preprocess.neutral import at_rest, most_neutral
+from facert.preprocess.preparation import Prepared, prepare
+from facert.preprocess.source_layout import SourceLayout
+from facert.preprocess.training_set import TrainingSet, choose_training_set
 from facert.regions.layout import FaceData, method_for
 from facert.regions.resolution import resolved
 from facert.retargeter import Retargeter
 from facert.sanity import check_poses, warn_if_constant
 from facert.settings import LimitRule, Settings
-from facert.source_layout import SourceLayout
-from facert.training_set import TrainingSet, choose_training_set
 
 log = logging.getLogger(__name__)
 

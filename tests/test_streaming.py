@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import facert
 from facert import InputError, Settings, Source
 from facert.adjustments import Adjustments
-from facert.cleaning.filtering import HEARD
 from facert.handling import AS_IT_IS, Handling
+from facert.preprocess.motion.filtering import HEARD
 from facert.streaming import _Finish
 
 

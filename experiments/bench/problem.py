@@ -13,8 +13,8 @@ from facert import Take
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.methods.base import Labelled, Unlabelled
+from facert.preprocess.training_set import choose_training_set
 from facert.settings import Settings
-from facert.training_set import choose_training_set
 
 # One BLAS thread, as everywhere in facert for problems of this size.
 torch.set_num_threads(1)

@@ -14,9 +14,9 @@ from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGM
 from facert.errors import reading
 
 if TYPE_CHECKING:
-    from facert.cleaning.cleaning import Cleaned
     from facert.data.take import Take
     from facert.handling import Handling
+    from facert.retarget.cleaning import Cleaned
 
 
 def command(
@@ -81,7 +81,7 @@ def _clean(
 
 
 def _cleaned(take: Take, model: Path | None, handling: Handling) -> Cleaned:
-    from facert.cleaning.cleaning import clean, clean_with_model
+    from facert.retarget.cleaning import clean, clean_with_model
 
     if model is None:
         return clean(take, handling.sigma)

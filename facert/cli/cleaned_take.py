@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:
     """Read a take, without its bad markers unless they are to be believed."""
-    from facert.cleaning.detection import without_faults
     from facert.errors import reading
     from facert.io.formats import read_source_file
+    from facert.preprocess.faults import without_faults
 
     take = read_source_file(path, target)
     with reading(path):

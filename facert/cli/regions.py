@@ -22,7 +22,7 @@ def command(
     """
     from facert.io.formats import read_take_file
     from facert.io.regions import regions_text
-    from facert.preparation import prepare
+    from facert.preprocess.preparation import prepare
     from facert.regions.automatic import find_regions
     from facert.settings import Settings
 

@@ -14,8 +14,8 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
-    from facert.cleaning.stabilisation import Stabilised
     from facert.data.arrays import FloatArray
+    from facert.preprocess.head_motion import Stabilised
 
 
 def command(
@@ -52,9 +52,9 @@ def command(
     than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
     as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
     """
-    from facert.cleaning.stabilisation import stabilise
     from facert.cli.cleaned_take import read_observed, write_beside
     from facert.io.formats import read_source_file, require_take_output, targets_for
+    from facert.preprocess.head_motion import stabilise
 
     require_take_output(output, overwrite)
     require_other_file(source, output, "IN")

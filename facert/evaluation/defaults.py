@@ -6,7 +6,7 @@ import numpy as np
 
 from facert.errors import InputError
 from facert.evaluation.protocol import Problem, pools
-from facert.training_set import MIN_LABELS
+from facert.preprocess.training_set import MIN_LABELS
 
 LABELS = (10, 20, 30, 40)
 UNLABELLED = 100

@@ -20,8 +20,8 @@ from facert.data.take import Controls, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.metrics import vertex_gram
+from facert.preprocess.training_set import MIN_OBSERVED
 from facert.sanity import foretold_poses
-from facert.training_set import MIN_OBSERVED
 
 Split = Literal["random", "block"]
 

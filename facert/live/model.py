@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import facert
-from facert.cleaning.watching import MarkerWatch
 from facert.errors import FacertError, InputError, NumericalError
 from facert.handling import Handling
 from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
 from facert.live.placement import PlacementWatch
 from facert.live.rest import RestWatch
+from facert.preprocess.live_faults import MarkerWatch
 
 if TYPE_CHECKING:
     from facert.data.arrays import FloatArray

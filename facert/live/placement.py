@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.cleaning.watching import MarkerWatch
 from facert.data.arrays import FloatArray
 from facert.data.names import NameIndex
 from facert.live.frames import Frame
 from facert.live.rest import RestWatch
 from facert.mesh.rigid import align, determined
+from facert.preprocess.live_faults import MarkerWatch
 
 if TYPE_CHECKING:
     from facert.retargeter import Retargeter

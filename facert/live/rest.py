@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.cleaning.watching import MarkerWatch
 from facert.data.arrays import FloatArray
 from facert.live.frames import Frame
-from facert.neutral import median_at_rest
+from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.neutral import median_at_rest
 
 HUGE = 1e100  # whatever the unit, no place: what others do with it would overflow
 

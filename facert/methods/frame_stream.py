@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.gaps import Gaussian
 from facert.methods.base import Prediction
+from facert.preprocess.gaps import Gaussian
 
 if TYPE_CHECKING:
     from facert.methods.regression import Map

@@ -22,11 +22,11 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind, Take
 from facert.errors import InputError
-from facert.gaps import fill_gaps
 from facert.models.whitening import whitening
+from facert.preprocess.gaps import fill_gaps
+from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retargeter import Retargeter
 from facert.suggestion.medoids import LEAST_GAIN, Choice
-from facert.training_set import MIN_OBSERVED
 
 # Of the whitening: markers move by what the skin does, weights have all the same range by nature.
 POWERS: dict[SourceKind, float] = {"markers": 0.75, "weights": 0.5}

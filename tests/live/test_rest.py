@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from facert.cleaning.watching import MarkerWatch
 from facert.live.frames import Frame
 from facert.live.rest import RestWatch
+from facert.preprocess.live_faults import MarkerWatch
 
 
 def watched(values, seconds=1.0, fps=10.0):

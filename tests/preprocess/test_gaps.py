@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from facert import gaps
-from facert.gaps import Gaussian, fill_gaps
+from facert.preprocess import gaps
+from facert.preprocess.gaps import Gaussian, fill_gaps
 
 
 def rows(n=300, d=9, rank=3, noise=0.0, seed=0):

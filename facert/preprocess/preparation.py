@@ -7,15 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.cleaning.detection import without_faults
-from facert.cleaning.estimate import LEAST_NOISE, Estimate, estimate_if_it_moves, largest_step
-from facert.cleaning.motion import Motion
-from facert.cleaning.noise import capture_noise
 from facert.data.normalisation import Normalisation
 from facert.data.take import Source, Take
 from facert.data.text import plural
+from facert.preprocess.faults import without_faults
+from facert.preprocess.motion.estimate import (
+    LEAST_NOISE,
+    Estimate,
+    estimate_if_it_moves,
+    largest_step,
+)
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.training_set import MIN_OBSERVED
 from facert.settings import Settings
-from facert.training_set import MIN_OBSERVED
 
 log = logging.getLogger(__name__)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facert.source_layout import FramePicker, SourceLayout
+from facert.preprocess.source_layout import FramePicker, SourceLayout
 
 NAMES = tuple("abcdefg")
 

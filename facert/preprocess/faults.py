@@ -22,11 +22,11 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from facert.cleaning.interpolation import interpolated
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.take import Source, Take
-from facert.gaps import Gaussian
-from facert.remembering import remembered
+from facert.preprocess.cache import remembered
+from facert.preprocess.gaps import Gaussian
+from facert.preprocess.motion.interpolation import interpolated
 
 log = logging.getLogger(__name__)
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from facert.cleaning import filtering
-from facert.cleaning.filtering import MotionFilter, _FactorFilter, _SeriesFilter
-from facert.cleaning.motion import Motion
-from facert.cleaning.smoothing import smooth_factors, smooth_series
-from facert.cleaning.watching import HELD, MarkerWatch
 from facert.data.normalisation import Normalisation
+from facert.preprocess.live_faults import HELD, MarkerWatch
+from facert.preprocess.motion import filtering
+from facert.preprocess.motion.filtering import MotionFilter, _FactorFilter, _SeriesFilter
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.motion.smoothing import smooth_factors, smooth_series
 
 SIGMA = 0.1
 
@@ -138,7 +138,7 @@ def test_a_spike_in_one_marker_is_forgotten_in_ten_frames(motion, noisy):
 
 
 def test_a_long_take_in_parts_is_the_take_as_a_whole(motion, noisy, monkeypatch):
-    from facert.cleaning import motion as room
+    from facert.preprocess.motion import motion as room
 
     X = np.where(np.random.default_rng(1).random(noisy.shape) < 0.3, np.nan, noisy)
     whole = motion.smooth(X, SIGMA)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from facert.cleaning.calibration import RANGE, error_of_filling
-from facert.cleaning.estimate import estimate
 from facert.metrics import rms
+from facert.preprocess.motion.calibration import RANGE, error_of_filling
+from facert.preprocess.motion.estimate import estimate
 
 FRAMES, COLUMNS = 400, 24
 

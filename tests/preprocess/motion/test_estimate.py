@@ -2,22 +2,22 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from facert.cleaning import smoothing
-from facert.cleaning.estimate import (
+from facert.errors import InputError
+from facert.io.formats import read_take_file
+from facert.preprocess.gaps import fill_gaps
+from facert.preprocess.motion import smoothing
+from facert.preprocess.motion.estimate import (
     LONGEST,
     estimate,
     estimate_if_it_moves,
     grid,
     largest_step,
 )
-from facert.cleaning.factors import Factors
-from facert.cleaning.interpolation import interpolated
-from facert.cleaning.matern import decay, transition
-from facert.cleaning.noise import capture_noise
-from facert.cleaning.smoothing import smooth_factors, smooth_series
-from facert.errors import InputError
-from facert.gaps import fill_gaps
-from facert.io.formats import read_take_file
+from facert.preprocess.motion.factors import Factors
+from facert.preprocess.motion.interpolation import interpolated
+from facert.preprocess.motion.matern import decay, transition
+from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.motion.smoothing import smooth_factors, smooth_series
 
 
 def estimated(X, sigma=None):

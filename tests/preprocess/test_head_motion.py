@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from facert.cleaning.stabilisation import stabilise, stable_markers
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.formats import read_take_file
 from facert.mesh.rigid import align
+from facert.preprocess.head_motion import stabilise, stable_markers
 
 STABLE = [f"m{i}" for i in range(8)]
 

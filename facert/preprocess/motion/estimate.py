@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from facert.cleaning.calibration import error_of_filling
-from facert.cleaning.motion import Motion
-from facert.cleaning.noise import capture_noise
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.normalisation import STILL, Normalisation
 from facert.models.threads import threads_for
-from facert.remembering import remembered
+from facert.preprocess.cache import remembered
+from facert.preprocess.motion.calibration import error_of_filling
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.motion.noise import capture_noise
 
 log = logging.getLogger(__name__)
 
@@ -87,7 +87,7 @@ class Estimate:
 
 @remembered
 def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Estimate:
-    """The joint estimate of all frames, see `facert.cleaning.motion`.
+    """The joint estimate of all frames, see `facert.preprocess.motion.motion`.
 
     Parameters
     ----------

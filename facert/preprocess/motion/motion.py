@@ -13,12 +13,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.cleaning.factors import Factors
-from facert.cleaning.interpolation import interpolated
-from facert.cleaning.matern import QUICKEST, decay
-from facert.cleaning.smoothing import Smoothed, smooth_factors, smooth_series
 from facert.data.array_group import Arrays
 from facert.data.arrays import FloatArray, IntArray
+from facert.preprocess.motion.factors import Factors
+from facert.preprocess.motion.interpolation import interpolated
+from facert.preprocess.motion.matern import QUICKEST, decay
+from facert.preprocess.motion.smoothing import Smoothed, smooth_factors, smooth_series
 
 FACTORS = 16
 FIT = 1000
@@ -45,7 +45,7 @@ class Motion(Arrays):
     factors : Factors
         Of unit variance each; their noise is what else is in a column, without capture noise.
     rates : array, shape (q,)
-        How quickly each factor moves, see `facert.cleaning.matern`.
+        How quickly each factor moves, see `facert.preprocess.motion.matern`.
     rest, rest_rates : array, shape (d,)
         Variance and rate of what the factors leave over of each column.
     clock : array, shape (2,)

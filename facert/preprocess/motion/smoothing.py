@@ -16,8 +16,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from facert.cleaning.matern import transition
 from facert.data.arrays import BoolArray, FloatArray
+from facert.preprocess.motion.matern import transition
 
 SETTLED = 1e-10
 """A covariance that changes no more than by this, relative to its variances, no longer does."""

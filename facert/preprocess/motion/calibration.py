@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.cleaning.motion import Motion
 from facert.data.arrays import BoolArray, FloatArray
+from facert.preprocess.motion.motion import Motion
 
 LEAST = 100
 """Numbers to compare, at least."""

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from facert import InputError
-from facert.neutral import at_rest, calibrated, most_neutral
+from facert.preprocess.neutral import at_rest, calibrated, most_neutral
 
 WEIGHT = st.floats(0.0, 0.49)
 

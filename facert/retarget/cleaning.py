@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.cleaning.estimate import estimate
 from facert.data.arrays import BoolArray
 from facert.data.names import NameIndex
 from facert.data.take import Take
+from facert.preprocess.motion.estimate import estimate
 
 if TYPE_CHECKING:
     from facert.handling import Handling
@@ -39,7 +39,8 @@ class Cleaned:
 
 
 def clean(take: Take, sigma: float | None = None) -> Cleaned:
-    """Fill gaps and remove noise by what the take itself tells, see `facert.cleaning.estimate`.
+    """Fill gaps and remove noise by what the take itself tells, see
+    `facert.preprocess.motion.estimate`.
 
     Parameters
     ----------

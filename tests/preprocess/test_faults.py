@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from facert.cleaning.detection import exchanged, find_faults, held_values, single_spikes
 from facert.data.take import Source
 from facert.io.formats import read_take_file
+from facert.preprocess.faults import exchanged, find_faults, held_values, single_spikes
 
 
 def source(markers):

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from facert.cleaning.detection import find_faults
-from facert.cleaning.estimate import estimate
-from facert.remembering import remembered
+from facert.preprocess.cache import remembered
+from facert.preprocess.faults import find_faults
+from facert.preprocess.motion.estimate import estimate
 
 
 @pytest.fixture

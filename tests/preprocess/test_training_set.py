@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from facert.errors import InputError
+from facert.preprocess.training_set import FILL_FRAMES, choose_training_set
 from facert.settings import Settings
-from facert.training_set import FILL_FRAMES, choose_training_set
 
 
 @pytest.fixture

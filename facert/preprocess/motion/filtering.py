@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from facert.cleaning.factors import Factors
-from facert.cleaning.matern import transition
-from facert.cleaning.motion import LEAST_VARIANCE, Motion
-from facert.cleaning.noise import capture_noise
-from facert.cleaning.smoothing import forward_covariance
 from facert.data.arrays import BoolArray, FloatArray
+from facert.preprocess.motion.factors import Factors
+from facert.preprocess.motion.matern import transition
+from facert.preprocess.motion.motion import LEAST_VARIANCE, Motion
+from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.motion.smoothing import forward_covariance
 
 LEAST_REST = 1e-2
 """Least variance of what is left over of a column, relative to that of the noise."""
