@@ -27,8 +27,8 @@ from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
-from facert.posing.known import Given, KnownPoses
 from facert.posing.pose import known_poses
+from facert.preprocess.known_poses import Given, KnownPoses
 
 LABELS, POSES, TESTED = 10, 100, 100
 METHODS = ("conditional Gaussian", "completed afresh", "facert")

@@ -35,8 +35,8 @@ from facert.metrics import rms
 from facert.models.gp.regression import maximise_likelihood
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.posing.completion import Completion
-from facert.posing.known import KnownPoses
 from facert.posing.pose import complete_pose
+from facert.preprocess.known_poses import KnownPoses
 from facert.view.faces import posed_face
 from facert.view.render import render_sheet
 

@@ -18,7 +18,7 @@ from facert.methods import method_class
 from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
 from facert.methods.noise import with_noise
 from facert.models.optim.monitor import Monitor
-from facert.posing.known import keep
+from facert.preprocess.known_poses import keep
 from facert.preprocess.neutral import at_rest, most_neutral
 from facert.preprocess.preparation import Prepared, prepare
 from facert.preprocess.source_layout import SourceLayout

@@ -57,7 +57,7 @@ def make_method(settings: Settings) -> Method:
     With regions, one that has such a method a region; it is ready for `Method.load` alone.
     """
     if settings.regions is not None:
-        from facert.methods.regional import Regional
+        from facert.regions.regional import Regional
 
         return Regional(settings)
     return method_class(settings.method)(settings)

@@ -10,8 +10,8 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.take import Controls
 from facert.posing.completion import Completion, Posed
 from facert.posing.correction import correct
-from facert.posing.known import Given, KnownPoses
 from facert.posing.pose import FAR
+from facert.preprocess.known_poses import Given, KnownPoses
 
 KEPT = 32  # sets of pinned controls whose completion is kept: going back to one costs nothing
 

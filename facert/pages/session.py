@@ -14,8 +14,8 @@ from facert.data.take import Controls, Take
 from facert.errors import InputError
 from facert.io.take import write_take
 from facert.metrics import rms
-from facert.posing.known import KnownPoses, keep
 from facert.posing.pose import LEAST
+from facert.preprocess.known_poses import KnownPoses, keep
 from facert.retargeter import Retargeter
 from facert.suggestion.frames import Suggestion, suggest_frames
 from facert.training import train

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.posing.known import Given, KnownPoses
 from facert.posing.regression import PoseRegression
+from facert.preprocess.known_poses import Given, KnownPoses
 
 NEAR = 8.0  # γ
 ANYWHERE = 0.3  # ε: a few near poses may agree by chance

@@ -22,7 +22,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.posing.completion import Posed
-from facert.posing.known import Given, KnownPoses
+from facert.preprocess.known_poses import Given, KnownPoses
 
 SEEN = 0.1
 RIDGE = 1e-9  # relative to the mean variance of a control

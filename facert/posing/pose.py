@@ -16,7 +16,7 @@ from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
-from facert.posing.known import Given, KnownPoses, keep
+from facert.preprocess.known_poses import Given, KnownPoses, keep
 from facert.retargeter import Retargeter
 
 log = logging.getLogger(__name__)

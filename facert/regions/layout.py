@@ -14,8 +14,8 @@ from facert.errors import InputError
 from facert.methods import make_method
 from facert.methods.base import Method
 from facert.methods.noise import with_noise
-from facert.methods.regional import Layout, Regional
 from facert.regions.foretelling import left_out_errors
+from facert.regions.regional import Layout, Regional
 from facert.settings import Settings
 
 FAULTLESS = 1e-9  # least error of a region, relative to the variance of the control

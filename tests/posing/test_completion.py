@@ -9,8 +9,8 @@ from scipy.spatial.distance import cdist
 from facert.metrics import rms
 from facert.posing import regression
 from facert.posing.completion import Completion
-from facert.posing.known import MOST, Given, KnownPoses, keep
 from facert.posing.regression import PoseRegression
+from facert.preprocess.known_poses import MOST, Given, KnownPoses, keep
 
 
 def sheet(count, seed=0, controls=7):

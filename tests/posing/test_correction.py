@@ -5,7 +5,7 @@ import pytest
 
 from facert.metrics import rms
 from facert.posing.correction import correct
-from facert.posing.known import Given, KnownPoses
+from facert.preprocess.known_poses import Given, KnownPoses
 
 P = 6
 FREE = np.tile([-9.0, 9.0], (P, 1))

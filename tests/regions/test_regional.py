@@ -10,7 +10,7 @@ from facert import InputError, Settings
 from facert.data.regions import Region, Regions
 from facert.handling import AS_IT_IS
 from facert.methods import REGISTRY
-from facert.methods.regional import Layout, Regional
+from facert.regions.regional import Layout, Regional
 
 every_method = pytest.mark.parametrize("name", REGISTRY)
 QUICK = {
