@@ -26,9 +26,9 @@ This page is written by `make docs`, from the docstrings.
 OTHERS = {
     "facert.suggestion.frames": ("Suggestion",),
     "facert.posing.pose": ("CompletedPose",),
-    "facert.handling": ("Handling",),
-    "facert.adjustments": ("Adjustments",),
-    "facert.streaming": ("RetargetStream", "Streamed"),
+    "facert.retarget.options": ("Handling",),
+    "facert.retarget.adjustments": ("Adjustments",),
+    "facert.retarget.stream": ("RetargetStream", "Streamed"),
 }
 _HEADING = re.compile(r"^([A-Z]\w+)\n-{3,}\n", re.MULTILINE)
 

@@ -23,10 +23,10 @@ from experiments.report import markdown, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray
-from facert.handling import AS_IT_IS
 from facert.methods.shared_gplvm import SOONER
 from facert.metrics import rms
-from facert.retargeter import Retargeter
+from facert.retarget.options import AS_IT_IS
+from facert.retarget.retargeter import Retargeter
 
 SETTINGS = Settings(method="ssgplvm", unlabelled=100, detect=False, smooth=False)
 TRACKS = ("rom", "utterance_a", "utterance_b")

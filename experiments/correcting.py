@@ -23,12 +23,12 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray
-from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.posing.pose import known_poses
 from facert.preprocess.known_poses import Given, KnownPoses
+from facert.retarget.options import AS_IT_IS
 
 LABELS, POSES, TESTED = 10, 100, 100
 METHODS = ("conditional Gaussian", "completed afresh", "facert")

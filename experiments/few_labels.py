@@ -26,8 +26,8 @@ from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.handling import AS_IT_IS
 from facert.metrics import rms
+from facert.retarget.options import AS_IT_IS
 
 
 def gpr(take: Take, frames: FloatArray) -> FloatArray:

@@ -34,9 +34,9 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import control_groups
 from facert.data.regions import AUTO
 from facert.evaluation.comparison import Estimate, paired_ratio
-from facert.handling import AS_IT_IS
 from facert.io.journal import Journal, source_digest
 from facert.metrics import rms
+from facert.retarget.options import AS_IT_IS
 
 log = logging.getLogger(__name__)
 

@@ -38,9 +38,9 @@ from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.evaluation.figures import COLOURS, INK, MARKERS
-from facert.handling import AS_IT_IS, Handling
 from facert.metrics import rms
-from facert.retargeter import Mode
+from facert.retarget.options import AS_IT_IS, Handling
+from facert.retarget.retargeter import Mode
 
 KINDS, SHARES, NOISES = cleaning.KINDS, (0.1, 0.2, 0.4), (0.0, 0.05, 0.1, 0.2)
 PATTERNS = (("none", 0.0), *product(KINDS, SHARES))

@@ -25,8 +25,8 @@ from experiments.tracks import read_track
 from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray
 from facert.evaluation.comparison import Estimate, paired_ratio
-from facert.handling import AS_IT_IS
 from facert.metrics import rms
+from facert.retarget.options import AS_IT_IS
 from facert.suggestion.frames import suggest_frames
 
 POSABLE, UNLABELLED, TESTED = 0.6, 100, 300

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
-    from facert.model_file import load
     from facert.posing.pose import complete_pose
-    from facert.retargeter import Retargeter
+    from facert.retarget.model_file import load
+    from facert.retarget.retargeter import Retargeter
+    from facert.retarget.training import train
     from facert.settings import Settings
     from facert.suggestion.frames import suggest_frames
-    from facert.training import train
 
 __version__ = "0.1.0"
 
@@ -54,17 +54,17 @@ _HOMES = {
     "Controls": ("facert.data.take", "Controls"),
     "FacertError": ("facert.errors", "FacertError"),
     "InputError": ("facert.errors", "InputError"),
-    "Retargeter": ("facert.retargeter", "Retargeter"),
+    "Retargeter": ("facert.retarget.retargeter", "Retargeter"),
     "Rig": ("facert.data.take", "Rig"),
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),
     "complete_pose": ("facert.posing.pose", "complete_pose"),
-    "load": ("facert.model_file", "load"),
+    "load": ("facert.retarget.model_file", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
     "suggest_frames": ("facert.suggestion.frames", "suggest_frames"),
-    "train": ("facert.training", "train"),
+    "train": ("facert.retarget.training", "train"),
     "write_take": ("facert.io.formats", "write_take_file"),
 }
 

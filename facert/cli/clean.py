@@ -15,8 +15,8 @@ from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data.take import Take
-    from facert.handling import Handling
     from facert.retarget.cleaning import Cleaned
+    from facert.retarget.options import Handling
 
 
 def command(
@@ -70,7 +70,7 @@ def _clean(
 ) -> None:
     """One take."""
     from facert.cli.cleaned_take import read_observed, write_beside
-    from facert.handling import Handling
+    from facert.retarget.options import Handling
 
     take = read_observed(source, target, no_detect)
     with reading(source):
@@ -85,7 +85,7 @@ def _cleaned(take: Take, model: Path | None, handling: Handling) -> Cleaned:
 
     if model is None:
         return clean(take, handling.sigma)
-    from facert.model_file import load
+    from facert.retarget.model_file import load
 
     return clean_with_model(take, load(model), handling)
 

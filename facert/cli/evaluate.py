@@ -192,7 +192,7 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
     from dataclasses import asdict
 
     import facert
-    from facert.model_file import library_versions
+    from facert.retarget.model_file import library_versions
 
     return {
         **asdict(grid),

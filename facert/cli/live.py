@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
     from facert.live.frames import Receiver
     from facert.live.senders import UdpSender
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 _Parsed = TypeVar("_Parsed")
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from facert.handling import Handling
-    from facert.retargeter import Retargeter
+    from facert.retarget.options import Handling
+    from facert.retarget.retargeter import Retargeter
 
 TARGET = Annotated[
     str | None, typer.Option("--target", help="Which target of an .npz take that has several.")
@@ -76,11 +76,11 @@ def chosen_handling(
     neutral: str | None = None,
 ) -> Handling:
     """What the options ask for, of a take that goes through this model."""
-    from facert.adjustments import Adjustments
     from facert.data.ranges import parse_frames
     from facert.errors import reading
-    from facert.handling import Handling
     from facert.io.toml import read_toml
+    from facert.retarget.adjustments import Adjustments
+    from facert.retarget.options import Handling
 
     adjustments = None
     if controls is not None:

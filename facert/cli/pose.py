@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from facert.data.take import Take
     from facert.posing.pose import CompletedPose
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 SMALL = 0.005  # of a control's range: such values are not worth a line
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.pages.session import Session
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data.take import Take
-    from facert.handling import Handling
-    from facert.retargeter import Retargeter
+    from facert.retarget.options import Handling
+    from facert.retarget.retargeter import Retargeter
 
 
 class Mode(StrEnum):

@@ -15,7 +15,7 @@ from facert.data.text import plural
 if TYPE_CHECKING:
     from facert.data.arrays import IntArray
     from facert.data.take import Take
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
     from facert.suggestion.frames import Suggestion
 
 LABELS = "labels"
@@ -108,7 +108,7 @@ def _posed(take: Take, have: str) -> Sequence[int] | IntArray:
 
 
 def _model(path: str) -> Retargeter:
-    from facert.model_file import load
+    from facert.retarget.model_file import load
 
     if not path.endswith(".safetensors"):
         raise typer.BadParameter("--have takes the word labels, or a model (.safetensors)")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from facert.data.regions import Regions
     from facert.data.take import Take
     from facert.models.optim.monitor import Monitor
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 DEFAULT_MODEL = Path("model.safetensors")
 DEFAULTS = Settings()
@@ -137,9 +137,9 @@ def command(
     }
 
     import facert
-    from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
     from facert.cli.progress import ProgressBar
     from facert.methods import method_class
+    from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 
     begin = None if start is None else facert.load(start)
     settings = _settings(begin, config, options)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.pages.performance import Performance
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
     from facert.view.faces import Face
 
 

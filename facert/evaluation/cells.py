@@ -15,11 +15,11 @@ import numpy as np
 from facert.data.take import Take
 from facert.errors import FacertError
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
-from facert.handling import AS_IT_IS
 from facert.metrics import Scores, score
 from facert.models.threads import threads_for
+from facert.retarget.options import AS_IT_IS
+from facert.retarget.training import train
 from facert.settings import Settings
-from facert.training import train
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.metrics import vertex_gram
 from facert.preprocess.training_set import MIN_OBSERVED
-from facert.sanity import foretold_poses
+from facert.retarget.label_checks import foretold_poses
 
 Split = Literal["random", "block"]
 

@@ -14,7 +14,7 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.text import check_width, read_csv, read_header, to_numbers
-from facert.sanity import foretold_poses
+from facert.retarget.label_checks import foretold_poses
 
 log = logging.getLogger("facert")
 

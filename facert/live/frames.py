@@ -12,7 +12,7 @@ from facert.data.arrays import FloatArray
 from facert.data.take import Source, SourceKind, Take
 
 if TYPE_CHECKING:
-    from facert.streaming import Streamed
+    from facert.retarget.stream import Streamed
 
 
 class BadPacketError(ValueError):

@@ -15,18 +15,18 @@ import numpy as np
 
 import facert
 from facert.errors import FacertError, InputError, NumericalError
-from facert.handling import Handling
 from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
 from facert.live.placement import PlacementWatch
 from facert.live.rest import RestWatch
 from facert.preprocess.live_faults import MarkerWatch
+from facert.retarget.options import Handling
 
 if TYPE_CHECKING:
     from facert.data.arrays import FloatArray
     from facert.data.take import Take
-    from facert.retargeter import Retargeter
-    from facert.streaming import RetargetStream, Streamed
+    from facert.retarget.retargeter import Retargeter
+    from facert.retarget.stream import RetargetStream, Streamed
 
 log = logging.getLogger("facert")
 

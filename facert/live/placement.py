@@ -17,7 +17,7 @@ from facert.mesh.rigid import align, determined
 from facert.preprocess.live_faults import MarkerWatch
 
 if TYPE_CHECKING:
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 log = logging.getLogger("facert")
 

@@ -20,7 +20,7 @@ from facert.io.rate import nominal_rate
 from facert.live.frames import Frame, frame_pattern
 
 if TYPE_CHECKING:
-    from facert.streaming import Streamed
+    from facert.retarget.stream import Streamed
 
 log = logging.getLogger("facert")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from facert.live.frames import Counters, Encoder, Frame
 
 if TYPE_CHECKING:
-    from facert.streaming import Streamed
+    from facert.retarget.stream import Streamed
 
 SocketAddress = tuple[Any, ...]
 """As the system gives and takes it: host, port, and more of IPv6."""

@@ -1,7 +1,7 @@
 """The small interface of every retargeting method.
 
 A method works on normalised arrays, one row a frame or a pose, and knows nothing of takes or
-files: `facert.retargeter` stands between.
+files: `facert.retarget.retargeter` stands between.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from facert.pages.paint import Scale
 from facert.view.faces import Face, posed_face
 
 if TYPE_CHECKING:
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 APART = 0.5  # seconds between two frames that are listed
 _LOOKED_AT = 48  # frames that tell how far a scale goes

@@ -16,9 +16,9 @@ from facert.io.take import write_take
 from facert.metrics import rms
 from facert.posing.pose import LEAST
 from facert.preprocess.known_poses import KnownPoses, keep
-from facert.retargeter import Retargeter
+from facert.retarget.retargeter import Retargeter
+from facert.retarget.training import train
 from facert.suggestion.frames import Suggestion, suggest_frames
-from facert.training import train
 
 ENDING = ".posed.h5"
 

@@ -17,7 +17,7 @@ from facert.errors import InputError
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.preprocess.known_poses import Given, KnownPoses, keep
-from facert.retargeter import Retargeter
+from facert.retarget.retargeter import Retargeter
 
 log = logging.getLogger(__name__)
 

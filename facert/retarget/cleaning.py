@@ -14,8 +14,8 @@ from facert.data.take import Take
 from facert.preprocess.motion.estimate import estimate
 
 if TYPE_CHECKING:
-    from facert.handling import Handling
-    from facert.retargeter import Retargeter
+    from facert.retarget.options import Handling
+    from facert.retarget.retargeter import Retargeter
 
 log = logging.getLogger(__name__)
 

@@ -25,7 +25,7 @@ from facert.errors import InputError
 from facert.models.whitening import whitening
 from facert.preprocess.gaps import fill_gaps
 from facert.preprocess.training_set import MIN_OBSERVED
-from facert.retargeter import Retargeter
+from facert.retarget.retargeter import Retargeter
 from facert.suggestion.medoids import LEAST_GAIN, Choice
 
 # Of the whitening: markers move by what the skin does, weights have all the same range by nature.

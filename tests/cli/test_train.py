@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.checkpoint import checkpoint_path
 from facert.cli.train import _shown
+from facert.retarget.checkpoint import checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
 # A method that trains step by step.

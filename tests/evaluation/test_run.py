@@ -20,10 +20,10 @@ from facert.evaluation.protocol import (
     true_poses,
 )
 from facert.evaluation.run import Grid, fingerprint, run
-from facert.handling import AS_IT_IS
 from facert.io.journal import Journal
 from facert.methods import REGISTRY
 from facert.metrics import rms
+from facert.retarget.options import AS_IT_IS
 
 GRID = Grid(methods=("nearest", "ridge"), labels=(4, 6), unlabelled=(10,), repeats=2)
 

@@ -12,7 +12,7 @@ from facert.data.names import ARKIT_NAMES
 from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import Frame, frame_pattern
 from facert.live.livelink import LiveLinkEncoder
-from facert.streaming import Streamed
+from facert.retarget.stream import Streamed
 
 PATIENCE = 20.0
 """Seconds after which a packet on loopback is taken for lost."""

@@ -9,7 +9,7 @@ from facert.data.names import ARKIT_SHAPES
 from facert.live.endpoints import Address, open_receiver, open_sender
 from facert.live.frames import frame_pattern
 from facert.live.loop import Limits, Session
-from facert.streaming import Streamed
+from facert.retarget.stream import Streamed
 
 
 @pytest.fixture

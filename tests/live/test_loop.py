@@ -7,7 +7,7 @@ import pytest
 from facert.errors import NumericalError
 from facert.live.frames import Counters, Frame, frame_pattern
 from facert.live.loop import CATCH_UP, PATIENCE, Limits, Session
-from facert.streaming import Streamed
+from facert.retarget.stream import Streamed
 
 
 class Script:

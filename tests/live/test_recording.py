@@ -9,7 +9,7 @@ from facert.data.take import Controls
 from facert.errors import InputError, OutputExistsError
 from facert.live.frames import Frame, frame_pattern
 from facert.live.recording import Recordings
-from facert.streaming import Streamed
+from facert.retarget.stream import Streamed
 
 CONTROLS = Controls(("jawOpen", "cheekPuff"), np.array([[0.0, 1.0], [0.0, 2.0]]))
 RNG = np.random.default_rng(0)

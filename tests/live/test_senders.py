@@ -6,7 +6,7 @@ import pytest
 from facert.live.endpoints import Address, open_sender
 from facert.live.frames import Counters, Frame
 from facert.live.osc import parse
-from facert.streaming import Streamed
+from facert.retarget.stream import Streamed
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ import torch
 import facert
 from facert import Controls, InputError, Settings, Source
 from facert.errors import DeviceError
-from facert.handling import AS_IT_IS
 from facert.methods import REGISTRY, make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.metrics import rms
+from facert.retarget.options import AS_IT_IS
 
 every_method = pytest.mark.parametrize("name", REGISTRY)
 QUICK = {"latent_dim": 3, "neighbours": 5, "max_iterations": 40, "unlabelled": 30}

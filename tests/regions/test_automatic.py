@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from facert import Controls, InputError, Settings, Source, Take, train
-from facert.handling import AS_IT_IS
 from facert.regions.automatic import BETWEEN, LOWER, UPPER, find_regions, sides_by_name
+from facert.retarget.options import AS_IT_IS
 
 CONTROLS = ("browInnerUp", "eyeBlink_L", "eyeBlink_R", "jawOpen", "mouthSmile", "mouthPucker")
 UPPER_CONTROLS, LOWER_CONTROLS = CONTROLS[:3], CONTROLS[3:]

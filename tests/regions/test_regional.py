@@ -8,9 +8,9 @@ import pytest
 import facert
 from facert import InputError, Settings
 from facert.data.regions import Region, Regions
-from facert.handling import AS_IT_IS
 from facert.methods import REGISTRY
 from facert.regions.regional import Layout, Regional
+from facert.retarget.options import AS_IT_IS
 
 every_method = pytest.mark.parametrize("name", REGISTRY)
 QUICK = {

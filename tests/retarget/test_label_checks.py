@@ -12,7 +12,7 @@ import facert
 from facert.errors import InputError
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
-from facert.sanity import CONSTANT, check_poses, warn_if_constant
+from facert.retarget.label_checks import CONSTANT, check_poses, warn_if_constant
 from facert.settings import Settings
 
 

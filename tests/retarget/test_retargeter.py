@@ -11,9 +11,9 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 import facert
 from facert import Controls, InputError, Settings, Source
 from facert.data.normalisation import Normalisation
-from facert.handling import AS_IT_IS
 from facert.metrics import rms
 from facert.preprocess.training_set import choose_training_set
+from facert.retarget.options import AS_IT_IS
 
 QUICK = Settings(unlabelled=30, limits="declared")
 SHARED = replace(QUICK, method="ssgplvm", latent_dim=3, neighbours=5, max_iterations=60)

@@ -25,8 +25,8 @@ from facert.preprocess.source_layout import SourceLayout
 from facert.preprocess.training_set import TrainingSet, choose_training_set
 from facert.regions.layout import FaceData, method_for
 from facert.regions.resolution import resolved
-from facert.retargeter import Retargeter
-from facert.sanity import check_poses, warn_if_constant
+from facert.retarget.label_checks import check_poses, warn_if_constant
+from facert.retarget.retargeter import Retargeter
 from facert.settings import LimitRule, Settings
 
 log = logging.getLogger(__name__)

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.adjustments import Adjustments
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.handling import Handling
 from facert.methods.base import Prediction
 from facert.preprocess.live_faults import MarkerWatch
 from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import FramePicker
+from facert.retarget.adjustments import Adjustments
+from facert.retarget.options import Handling
 
 if TYPE_CHECKING:
-    from facert.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter
 
 
 ABSURD = 1e6

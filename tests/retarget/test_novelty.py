@@ -7,7 +7,7 @@ import pytest
 import facert
 from facert import Settings
 from facert.io.formats import read_take_file
-from facert.novelty import NEW, Novelty, Shown
+from facert.retarget.novelty import NEW, Novelty, Shown
 
 
 @pytest.fixture(scope="module")

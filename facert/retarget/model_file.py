@@ -19,7 +19,7 @@ from facert.io.tensors import read_tensors, write_tensors
 from facert.methods import make_method
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
-from facert.retargeter import Retargeter
+from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
 FORMAT = "facert-model"

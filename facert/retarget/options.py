@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from facert.adjustments import Adjustments
 from facert.errors import InputError
+from facert.retarget.adjustments import Adjustments
 
 
 @dataclass(frozen=True)

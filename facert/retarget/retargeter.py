@@ -1,7 +1,7 @@
 """A trained retargeter: from a take to a performance.
 
-This and `facert.training` are the one path of the data: take, normalised arrays, method, take.
-Nothing else normalises, and nothing else undoes it.
+This and `facert.retarget.training` are the one path of the data: take, normalised arrays, method,
+take. Nothing else normalises, and nothing else undoes it.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from facert.adjustments import Adjustments
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, Source, SourceKind, Take
 from facert.errors import InputError, NumericalError
-from facert.handling import Handling
 from facert.methods.base import Method
 from facert.models.threads import threads_for
-from facert.novelty import WORTH_TELLING, Novelty, Shown
 from facert.preprocess.faults import without_faults
 from facert.preprocess.motion.estimate import FEWEST, estimate_if_it_moves, grid
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.neutral import at_rest, calibrated
 from facert.preprocess.source_layout import SourceLayout
+from facert.retarget.adjustments import Adjustments
+from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
+from facert.retarget.options import Handling
+from facert.retarget.stream import ABSURD, RetargetStream
 from facert.settings import Settings
-from facert.streaming import ABSURD, RetargetStream
 
 log = logging.getLogger(__name__)
 
@@ -201,7 +201,7 @@ class Retargeter:
         OutputExistsError
             When the file exists and `overwrite` is false.
         """
-        from facert.model_file import save
+        from facert.retarget.model_file import save
 
         save(self, Path(path), overwrite)
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 import facert
 from facert import InputError, Settings, Source
-from facert.adjustments import Adjustments
-from facert.handling import AS_IT_IS, Handling
 from facert.preprocess.motion.filtering import HEARD
-from facert.streaming import _Finish
+from facert.retarget.adjustments import Adjustments
+from facert.retarget.options import AS_IT_IS, Handling
+from facert.retarget.stream import _Finish
 
 
 @pytest.fixture(scope="module")

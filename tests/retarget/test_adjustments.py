@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facert import InputError
-from facert.adjustments import Adjustments
+from facert.retarget.adjustments import Adjustments
 
 NAMES = ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "browInnerUp"]
 

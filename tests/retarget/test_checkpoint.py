@@ -3,12 +3,12 @@ import logging
 import numpy as np
 import pytest
 
-from facert.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import write_tensors
 from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.scg import SCG
+from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 
 
 def bowl(x):
