@@ -24,7 +24,7 @@ This page is written by `make docs`, from the docstrings.
 """
 # What the public functions take and return, by their modules.
 OTHERS = {
-    "facert.suggestion.frames": ("Suggestion",),
+    "facert.posing.suggestion": ("Suggestion",),
     "facert.posing.pose": ("CompletedPose",),
     "facert.retarget.options": ("Handling",),
     "facert.retarget.adjustments": ("Adjustments",),

@@ -26,8 +26,8 @@ from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray
 from facert.evaluation.comparison import Estimate, paired_ratio
 from facert.metrics import rms
+from facert.posing.suggestion import suggest_frames
 from facert.retarget.options import AS_IT_IS
-from facert.suggestion.frames import suggest_frames
 
 POSABLE, UNLABELLED, TESTED = 0.6, 100, 300
 RANDOM, SUGGESTED, TWO_GOES = "random", "suggested", "in two goes"

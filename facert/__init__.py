@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
     from facert.posing.pose import complete_pose
+    from facert.posing.suggestion import suggest_frames
     from facert.retarget.model_file import load
     from facert.retarget.retargeter import Retargeter
     from facert.retarget.training import train
     from facert.settings import Settings
-    from facert.suggestion.frames import suggest_frames
 
 __version__ = "0.1.0"
 
@@ -63,7 +63,7 @@ _HOMES = {
     "load": ("facert.retarget.model_file", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
-    "suggest_frames": ("facert.suggestion.frames", "suggest_frames"),
+    "suggest_frames": ("facert.posing.suggestion", "suggest_frames"),
     "train": ("facert.retarget.training", "train"),
     "write_take": ("facert.io.formats", "write_take_file"),
 }

@@ -15,8 +15,8 @@ from facert.data.text import plural
 if TYPE_CHECKING:
     from facert.data.arrays import IntArray
     from facert.data.take import Take
+    from facert.posing.suggestion import Suggestion
     from facert.retarget.retargeter import Retargeter
-    from facert.suggestion.frames import Suggestion
 
 LABELS = "labels"
 
@@ -54,7 +54,7 @@ def command(
     from facert.cli.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
-    from facert.suggestion.frames import suggest_frames
+    from facert.posing.suggestion import suggest_frames
     from facert.view.contact import contact_sheet, require_drawable
     from facert.view.render import MAX_FRAMES
 

@@ -15,10 +15,10 @@ from facert.errors import InputError
 from facert.io.take import write_take
 from facert.metrics import rms
 from facert.posing.pose import LEAST
+from facert.posing.suggestion import Suggestion, suggest_frames
 from facert.preprocess.known_poses import KnownPoses, keep
 from facert.retarget.retargeter import Retargeter
 from facert.retarget.training import train
-from facert.suggestion.frames import Suggestion, suggest_frames
 
 ENDING = ".posed.h5"
 

@@ -1,7 +1,7 @@
 """Frames that are worth posing.
 
 A method knows the poses near those that it was shown. So the frames to pose are those that all
-frames of the take are near to: the k-medoids of their features (`facert.suggestion.medoids`). Some
+frames of the take are near to: the k-medoids of their features (`facert.posing.medoids`). Some
 frames may be posed already; then the others are placed where these are far. Features are principal
 coordinates, at least half-whitened, so that a lid counts beside a jaw (`facert.models.whitening`).
 
@@ -23,10 +23,10 @@ from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind, Take
 from facert.errors import InputError
 from facert.models.whitening import whitening
+from facert.posing.medoids import LEAST_GAIN, Choice
 from facert.preprocess.gaps import fill_gaps
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.retargeter import Retargeter
-from facert.suggestion.medoids import LEAST_GAIN, Choice
 
 # Of the whitening: markers move by what the skin does, weights have all the same range by nature.
 POWERS: dict[SourceKind, float] = {"markers": 0.75, "weights": 0.5}

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from facert.suggestion.medoids import Choice
+from facert.posing.medoids import Choice
 
 
 def choice_of(points: np.ndarray, covered: np.ndarray | None = None) -> Choice:

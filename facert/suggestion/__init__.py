@@ -1,1 +1,0 @@
-"""Which frames of a take to pose: those that all others are near to."""
