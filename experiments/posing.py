@@ -37,8 +37,8 @@ from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.posing.completion import Completion
 from facert.posing.pose import complete_pose
 from facert.preprocess.known_poses import KnownPoses
-from facert.view.faces import posed_face
-from facert.view.render import render_sheet
+from facert.render.faces import posed_face
+from facert.render.sheet import render_sheet
 
 TUNED = "utterance_a", "optical_cheeks"
 PROBLEMS = (

@@ -25,12 +25,12 @@ from facert.data.names import shape_drivers
 from facert.data.rig import MeshSequence
 from facert.io.formats import read_rig_file
 from facert.io.mesh_sequence import write_mesh_sequence
+from facert.render.shade import frame_mesh, shade
 from facert.topology.alignment import alignment_matrix
 from facert.topology.driving import SURFACE, FaceDriver, smooth_energy
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings
 from facert.topology.solution import Elimination
 from facert.topology.suggestion import suggest_points
-from facert.view.shade import frame_mesh, shade
 
 POINTS = 80
 

@@ -21,10 +21,10 @@ from experiments.topology.recordings import RECORDINGS, expressive_frames
 from experiments.topology.scores import Scores, draw_curves
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import MeshSequence
+from facert.render.faces import Face
+from facert.render.sheet import render_sheet
 from facert.topology.driving import DEFAULT, METHODS, FaceDriver
 from facert.topology.suggestion import suggest_points
-from facert.view.faces import Face
-from facert.view.render import render_sheet
 
 OWN = ("smooth", "framework", "literal")
 FACES = 10

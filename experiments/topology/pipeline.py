@@ -23,13 +23,13 @@ from experiments.topology.driving import vertex_rms
 from experiments.topology.recordings import RECORDINGS, SEGMENT, liveliest, weights_of
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import MeshSequence
+from facert.render.faces import Face
+from facert.render.sheet import render_sheet
 from facert.topology import driving, propagation
 from facert.topology.driving import FaceDriver
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate
 from facert.topology.suggestion import suggest_points
-from facert.view.faces import Face
-from facert.view.render import render_sheet
 
 EXPRESSIONS = {11: "jawOpen", 12: "mouthSmileLeft", 13: "mouthFrownLeft", 14: "mouthPucker"}
 KEYS = np.linspace(0, SEGMENT - 1, 10).round().astype(int)

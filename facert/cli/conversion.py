@@ -20,7 +20,7 @@ from facert.io import formats, usd
 from facert.io.glb import write_glb
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
 from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
-from facert.view.faces import control_settings
+from facert.render.faces import control_settings
 
 if TYPE_CHECKING:
     from facert.io.formats import Kind

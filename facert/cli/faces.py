@@ -10,7 +10,7 @@ from facert.data.take import Take
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-from facert.view.faces import Face, posed_face
+from facert.render.faces import Face, posed_face
 
 
 def open_face(

@@ -32,8 +32,8 @@ def command(
     """Draw controls over time, with their uncertainty and the truth."""
     from facert.cli.pictures import require_picture_name, save_picture
     from facert.io.formats import read_take_file, targets_for
-    from facert.view.faces import require_poses
-    from facert.view.plots import plot_controls
+    from facert.render.faces import require_poses
+    from facert.render.plots import plot_controls
 
     require_picture_name(output, overwrite)
     ours, theirs = targets_for(target, take_path, truth_path)

@@ -45,8 +45,8 @@ def suggest(
     from facert.cli.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
+    from facert.render.points import draw_points
     from facert.topology.suggestion import suggest_points
-    from facert.view.points import draw_points
 
     if picture is not None:
         require_picture_name(picture, overwrite)

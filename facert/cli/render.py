@@ -14,7 +14,7 @@ from facert.data.text import plural
 
 if TYPE_CHECKING:
     from facert.data.take import Take
-    from facert.view.faces import Face
+    from facert.render.faces import Face
 
 FACES = 6
 CLIP_RATES = {".mp4": 30.0, ".gif": 20.0}
@@ -88,8 +88,8 @@ def _sheet(
 ) -> str:
     """Draw some frames of every face; return which."""
     from facert.cli.pictures import save_picture
-    from facert.view.faces import choose_frames, outline, require_part, require_poses
-    from facert.view.render import render_sheet
+    from facert.render.faces import choose_frames, outline, require_part, require_poses
+    from facert.render.sheet import render_sheet
 
     if not isinstance(wanted, list):
         part = range(len(faces[0].motion)) if wanted is None else wanted
@@ -113,8 +113,8 @@ def _clip(
     from rich.progress import track
 
     from facert.io.video import write_clip
-    from facert.view.clip import draw_clip, sampled_frames
-    from facert.view.faces import require_part
+    from facert.render.clip import draw_clip, sampled_frames
+    from facert.render.faces import require_part
 
     if isinstance(wanted, list):
         raise typer.BadParameter("a clip shows a part of the take: give it as in 100..400")

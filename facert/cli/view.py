@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.pages.performance import Performance
+    from facert.render.faces import Face
     from facert.retarget.retargeter import Retargeter
-    from facert.view.faces import Face
 
 
 def command(
@@ -88,7 +88,7 @@ def actor_of(take: Take, path: Path | None, shapes: str | None) -> Face | None:
         When the take holds markers, or the rig has a shape for none of the weights.
     """
     from facert.io.formats import read_rig_file
-    from facert.view.contact import actor_face
+    from facert.render.contact import actor_face
 
     if path is None:
         return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
-from facert.view.plots import CURVE, INK, TRUTH
+from facert.render.plots import CURVE, INK, TRUTH
 
 if TYPE_CHECKING:
     from viser import GuiUplotHandle, ViserServer

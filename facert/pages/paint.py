@@ -13,7 +13,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
-from facert.view.shade import CLAY
+from facert.render.shade import CLAY
 
 MOST = 24  # colours of a face
 LEVELS = 10  # of a scale

@@ -15,7 +15,7 @@ from facert.data.take import Take
 from facert.errors import InputError
 from facert.metrics import compare, vertex_errors, vertex_gram
 from facert.pages.paint import Scale
-from facert.view.faces import Face, posed_face
+from facert.render.faces import Face, posed_face
 
 if TYPE_CHECKING:
     from facert.retarget.retargeter import Retargeter

@@ -22,7 +22,7 @@ from facert.pages.session import Session, Trained
 from facert.pages.sliders import Pins, Sliders
 from facert.pages.timeline import Places, Timeline
 from facert.pages.worker import Worker
-from facert.view.faces import Face
+from facert.render.faces import Face
 
 if TYPE_CHECKING:
     from viser import GuiHtmlHandle, ViserServer

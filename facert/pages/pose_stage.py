@@ -12,7 +12,7 @@ from facert.data.rig import Rig
 from facert.pages.paint import skin
 from facert.pages.session import Session
 from facert.pages.stage import FacePart, MarkerPart, Stage
-from facert.view.faces import Face
+from facert.render.faces import Face
 
 if TYPE_CHECKING:
     from viser import ViserServer

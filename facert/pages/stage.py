@@ -15,7 +15,7 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.mesh.normals import vertex_normals
 from facert.pages.paint import LEVELS, MOST, Paint
-from facert.view.shade import frame_mesh
+from facert.render.shade import frame_mesh
 
 if TYPE_CHECKING:
     from viser import CameraHandle, ClientHandle, ViserServer
@@ -257,7 +257,7 @@ class Stage:
 
 
 def _light(server: ViserServer) -> None:
-    """A warm key from the upper left, cool sky, and a rim: as in `facert.view.shade`."""
+    """A warm key from the upper left, cool sky, and a rim: as in `facert.render.shade`."""
     scene = server.scene
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)

@@ -16,7 +16,7 @@ from facert.pages.server import complainer
 from facert.pages.stage import FacePart, MarkerPart, Stage
 from facert.pages.timeline import Places, Timeline
 from facert.pages.worker import Worker
-from facert.view.faces import Face
+from facert.render.faces import Face
 
 if TYPE_CHECKING:
     from viser import ViserServer

@@ -21,7 +21,7 @@ from facert.io.livelink import read_livelink
 from facert.io.mesh import read_mesh
 from facert.io.npz import read_npz_rig
 from facert.mesh.morphs import rig_morphs
-from facert.view.faces import control_settings
+from facert.render.faces import control_settings
 
 BLENDER = Path(__file__).parent / "files" / "blender.glb"  # made and exported in Blender 5.0
 TRIANGLE = np.eye(3, dtype=np.float32)

@@ -13,11 +13,11 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.mesh.normals import vertex_normals
-from facert.view.faces import choose_frames, control_settings
-from facert.view.plots import plot_controls
-from facert.view.raster import rasterise
-from facert.view.render import render_faces
-from facert.view.shade import Camera, frame_mesh, shade
+from facert.render.faces import choose_frames, control_settings
+from facert.render.plots import plot_controls
+from facert.render.raster import rasterise
+from facert.render.shade import Camera, frame_mesh, shade
+from facert.render.sheet import render_faces
 
 SQUARE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 FRONT = np.array([[0, 1, 2], [0, 2, 3]])

@@ -9,7 +9,7 @@ import numpy as np
 
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.view.faces import require_poses
+from facert.render.faces import require_poses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

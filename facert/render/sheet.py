@@ -10,8 +10,8 @@ import numpy as np
 from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.view.faces import Face, frame_faces, posed_face, require_same_length
-from facert.view.shade import Camera, shade
+from facert.render.faces import Face, frame_faces, posed_face, require_same_length
+from facert.render.shade import Camera, shade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

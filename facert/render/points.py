@@ -8,7 +8,7 @@ import numpy as np
 
 from facert.data.arrays import IntArray
 from facert.data.rig import Mesh
-from facert.view.shade import frame_mesh, shade
+from facert.render.shade import frame_mesh, shade
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,9 +13,9 @@ from facert.data.names import shape_drivers
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.view.faces import Face, frame_faces
-from facert.view.render import checked_frames
-from facert.view.shade import shade
+from facert.render.faces import Face, frame_faces
+from facert.render.shade import shade
+from facert.render.sheet import checked_frames
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

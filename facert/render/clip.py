@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.view.faces import Face, frame_faces, require_same_length
-from facert.view.shade import Camera, shade
+from facert.render.faces import Face, frame_faces, require_same_length
+from facert.render.shade import Camera, shade
 
 PIXELS = 300
 CAPTION = 28

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError
-from facert.view.clip import CAPTION, draw_clip, sampled_frames
-from facert.view.faces import Face, choose_frames, frame_faces, outline, require_part
-from facert.view.raster import rasterise
-from facert.view.render import render_sheet
+from facert.render.clip import CAPTION, draw_clip, sampled_frames
+from facert.render.faces import Face, choose_frames, frame_faces, outline, require_part
+from facert.render.raster import rasterise
+from facert.render.sheet import render_sheet
 
 SQUARE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 MESH = Mesh(SQUARE, np.array([[0, 1, 2], [0, 2, 3]]))

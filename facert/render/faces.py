@@ -12,7 +12,7 @@ from facert.data.names import shape_drivers
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.view.shade import Camera, frame_mesh
+from facert.render.shade import Camera, frame_mesh
 
 TURN = -0.22  # radians; seen a little from the side, a face has more shape
 _LOOKED_AT = 16  # frames that tell how much room a face needs

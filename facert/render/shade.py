@@ -9,7 +9,7 @@ from scipy.ndimage import binary_fill_holes, uniform_filter
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.mesh.normals import vertex_normals
-from facert.view.raster import Surface, rasterise
+from facert.render.raster import Surface, rasterise
 
 CLAY = (0.80, 0.72, 0.66)
 DARK = np.array([0.13, 0.05, 0.05])  # the inside of a mesh, as seen through an open mouth
