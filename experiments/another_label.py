@@ -23,8 +23,8 @@ from experiments.report import markdown, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray
+from facert.evaluation.metrics import rms
 from facert.methods.shared_gplvm import SOONER
-from facert.metrics import rms
 from facert.retarget.options import AS_IT_IS
 from facert.retarget.retargeter import Retargeter
 

@@ -23,7 +23,7 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.posing.pose import known_poses

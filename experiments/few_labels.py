@@ -26,7 +26,7 @@ from experiments.tracks import draw, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 from facert.retarget.options import AS_IT_IS
 
 

@@ -30,8 +30,8 @@ from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Source
+from facert.evaluation.metrics import rms
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
-from facert.metrics import rms
 from facert.models.gp.regression import maximise_likelihood
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.posing.completion import Completion

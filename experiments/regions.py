@@ -34,8 +34,8 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import control_groups
 from facert.data.regions import AUTO
 from facert.evaluation.comparison import Estimate, paired_ratio
+from facert.evaluation.metrics import rms
 from facert.io.journal import Journal, source_digest
-from facert.metrics import rms
 from facert.retarget.options import AS_IT_IS
 
 log = logging.getLogger(__name__)

@@ -38,7 +38,7 @@ from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.evaluation.figures import COLOURS, INK, MARKERS
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 from facert.retarget.options import AS_IT_IS, Handling
 from facert.retarget.retargeter import Mode
 

@@ -23,8 +23,8 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Source, Take
 from facert.data.arrays import FloatArray
+from facert.evaluation.metrics import rms
 from facert.mesh.rigid import RigidMotion, align
-from facert.metrics import rms
 from facert.preprocess.head_motion import stabilise
 
 CHOSEN = ("ForeHead_M", "ForeHead_L", "ForeHead_R", "NoseTop")

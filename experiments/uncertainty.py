@@ -25,7 +25,7 @@ from experiments.report import markdown, write_text
 from experiments.robustness import Cell, spoil
 from facert import Settings
 from facert.data.arrays import FloatArray
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 
 NOISES = (0.0, 0.05)
 SHARE = 0.2  # of the markers, on average, that are hidden

@@ -35,8 +35,8 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take
 from facert.data.arrays import IntArray
+from facert.evaluation.metrics import rms
 from facert.io.journal import Journal
-from facert.metrics import rms
 
 log = logging.getLogger(__name__)
 

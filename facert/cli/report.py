@@ -44,9 +44,9 @@ def command(
         raise OutputExistsError(output)
 
     from facert.io.formats import read_rig_file, read_take_file
-    from facert.report.folder import file_section, folder_sections
-    from facert.report.page import make_report, write_report
-    from facert.report.sections import Section
+    from facert.pages.report.folder import file_section, folder_sections
+    from facert.pages.report.page import make_report, write_report
+    from facert.pages.report.sections import Section
 
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
     truth = read_take_file(truth_path, target) if truth_path is not None else None

@@ -171,7 +171,7 @@ def _print_errors(truth: Take, result: Take, trust: str) -> None:
     """RMS against the truth of the same controls."""
     from rich.table import Table
 
-    from facert.metrics import compare
+    from facert.evaluation.metrics import compare
 
     comparison = compare(truth, result)
     assert comparison is not None  # they share controls and posed frames

@@ -14,8 +14,8 @@ import numpy as np
 
 from facert.data.take import Take
 from facert.errors import FacertError
+from facert.evaluation.metrics import Scores, score
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
-from facert.metrics import Scores, score
 from facert.models.threads import threads_for
 from facert.retarget.options import AS_IT_IS
 from facert.retarget.training import train

@@ -19,7 +19,7 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.metrics import vertex_gram
+from facert.evaluation.metrics import vertex_gram
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.label_checks import foretold_poses
 

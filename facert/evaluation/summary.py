@@ -10,8 +10,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.evaluation.cells import Outcome
+from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
-from facert.metrics import Scores
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Row:
     ratio_to_best : float or None
         `rms` over the least one of the methods that ran every repeat, on the same draws.
     rms_normalised, jitter, vertex_rms, vertex_p95, per_control
-        Means of the measures of `facert.metrics.Scores`.
+        Means of the measures of `facert.evaluation.metrics.Scores`.
     fit_seconds, frame_ms : float or None
         Training, and mapping one frame of many.
     failure : str

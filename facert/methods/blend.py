@@ -31,13 +31,13 @@ from scipy.optimize import nnls
 
 from facert.data.array_group import Arrays
 from facert.data.arrays import FloatArray
+from facert.evaluation.metrics import rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.factors import FactorMap, Trio, left_out_poses
 from facert.methods.one_frame import BlendFrame
 from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
 from facert.methods.ssgpr import Basis, FeatureProcess
-from facert.metrics import rms
 
 TOGETHER = 0.3  # ρ
 FAULTLESS = 1e-9  # least E, relative to the squared error of the worst expert

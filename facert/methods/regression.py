@@ -19,9 +19,9 @@ from facert.data.array_group import DAMAGED, Arrays, check_axes
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
+from facert.evaluation.metrics import rms
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
-from facert.metrics import rms
 from facert.models.device import find_device
 from facert.models.optim.monitor import Monitor
 from facert.models.threads import threads_for

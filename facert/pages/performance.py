@@ -13,7 +13,7 @@ from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.metrics import compare, vertex_errors, vertex_gram
+from facert.evaluation.metrics import compare, vertex_errors, vertex_gram
 from facert.pages.paint import Scale
 from facert.render.faces import Face, posed_face
 

@@ -12,8 +12,8 @@ from facert.data.names import match
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.errors import InputError
+from facert.evaluation.metrics import rms
 from facert.io.take import write_take
-from facert.metrics import rms
 from facert.posing.pose import LEAST
 from facert.posing.suggestion import Suggestion, suggest_frames
 from facert.preprocess.known_poses import KnownPoses, keep

@@ -4,7 +4,7 @@ import numpy as np
 
 from facert.data.shared_controls import shared_controls
 from facert.data.take import Controls, Source, Take
-from facert.metrics import compare
+from facert.evaluation.metrics import compare
 
 
 def take(params, names):

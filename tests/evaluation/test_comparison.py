@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.comparison import Estimate, errors_by_method, paired_ratio
-from facert.metrics import Scores
+from facert.evaluation.metrics import Scores
 
 numbers = st.lists(st.floats(0.01, 1.0), min_size=2, max_size=8).map(np.array)
 

@@ -11,6 +11,7 @@ import facert
 from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.evaluation.cells import Cell, Outcome, cell_settings, evaluate
+from facert.evaluation.metrics import rms
 from facert.evaluation.protocol import (
     Protocol,
     draw,
@@ -22,7 +23,6 @@ from facert.evaluation.protocol import (
 from facert.evaluation.run import Grid, fingerprint, run
 from facert.io.journal import Journal
 from facert.methods import REGISTRY
-from facert.metrics import rms
 from facert.retarget.options import AS_IT_IS
 
 GRID = Grid(methods=("nearest", "ridge"), labels=(4, 6), unlabelled=(10,), repeats=2)

@@ -4,9 +4,9 @@ import pytest
 from facert.evaluation.advice import advise
 from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.figures import panels, plot_errors
+from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
 from facert.evaluation.summary import best, summarise
-from facert.metrics import Scores
 
 
 def outcome(method, labels, repeat, rms, unlabelled=100):

@@ -4,10 +4,10 @@ from experiments.drawing import Panel, draw_panels
 from experiments.grid import KEPT, Case, CellJournal, code_of, kinds
 from experiments.report import markdown, write_csv
 from facert.evaluation.cells import Cell, Outcome
+from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
 from facert.evaluation.summary import summarise
 from facert.methods import REGISTRY
-from facert.metrics import Scores
 
 CASE = Case("rom", "arkit")
 

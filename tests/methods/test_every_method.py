@@ -9,9 +9,9 @@ import torch
 import facert
 from facert import Controls, InputError, Settings, Source
 from facert.errors import DeviceError
+from facert.evaluation.metrics import rms
 from facert.methods import REGISTRY, make_method
 from facert.methods.base import Labelled, Unlabelled
-from facert.metrics import rms
 from facert.retarget.options import AS_IT_IS
 
 every_method = pytest.mark.parametrize("name", REGISTRY)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from facert.errors import InputError
+from facert.evaluation.metrics import rms
 from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
-from facert.metrics import rms
 from facert.models.gplvm import staging
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from facert.evaluation.metrics import rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.ssgpr import SemiSupervisedGPR
-from facert.metrics import rms
 from facert.settings import Settings
 
 

@@ -11,7 +11,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 import facert
 from facert import Controls, InputError, Settings, Source
 from facert.data.normalisation import Normalisation
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 from facert.preprocess.training_set import choose_training_set
 from facert.retarget.options import AS_IT_IS
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facert.metrics import rms
+from facert.evaluation.metrics import rms
 from facert.preprocess.motion.calibration import RANGE, error_of_filling
 from facert.preprocess.motion.estimate import estimate
 

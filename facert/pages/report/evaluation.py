@@ -17,8 +17,8 @@ from facert.errors import InputError, reading
 from facert.evaluation.figures import INK, plot_errors
 from facert.evaluation.summary import Row, best
 from facert.io.text import existing_file, read_text
-from facert.report.pictures import embedded
-from facert.report.sections import Fact, Picture, Section, Table
+from facert.pages.report.pictures import embedded
+from facert.pages.report.sections import Fact, Picture, Section, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,10 +16,10 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.errors import InputError
 from facert.evaluation.summary import Row
-from facert.report.evaluation import read_evaluation
-from facert.report.page import make_report, to_html
-from facert.report.performance import fits, performance_section, truth_among
-from facert.report.sections import Fact, Section, Table
+from facert.pages.report.evaluation import read_evaluation
+from facert.pages.report.page import make_report, to_html
+from facert.pages.report.performance import fits, performance_section, truth_among
+from facert.pages.report.sections import Fact, Section, Table
 
 HOSTILE = '<script>alert("1")</script>'
 CONTROLS = ("$x", "</text><script>", "--><script>", "<img src=http://a.b/c>")

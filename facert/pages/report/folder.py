@@ -21,9 +21,9 @@ from facert.io.hdf5 import stated_format
 from facert.io.rig import FORMAT as RIG_FORMAT
 from facert.io.rig import read_rig
 from facert.io.take import FORMAT as TAKE_FORMAT
-from facert.report.evaluation import read_evaluation
-from facert.report.performance import fits, performance_section, truth_among
-from facert.report.sections import Fact, Section
+from facert.pages.report.evaluation import read_evaluation
+from facert.pages.report.performance import fits, performance_section, truth_among
+from facert.pages.report.sections import Fact, Section
 
 log = logging.getLogger("facert")
 

@@ -5,7 +5,7 @@ import pytest
 
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
-from facert.metrics import compare, jitter, rms, score, vertex_errors, vertex_gram
+from facert.evaluation.metrics import compare, jitter, rms, score, vertex_errors, vertex_gram
 
 NAMES = ("jawOpen", "browDown_L", "browDown_R")
 

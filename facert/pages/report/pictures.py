@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from facert.report.sections import Picture
+from facert.pages.report.sections import Picture
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

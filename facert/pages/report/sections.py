@@ -1,10 +1,10 @@
-"""What a report is made of. All text is plain: `facert.report.page` escapes it."""
+"""What a report is made of. All text is plain: `facert.pages.report.page` escapes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from facert.metrics import Comparison
+from facert.evaluation.metrics import Comparison
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined, Template
 
 from facert.io.atomic import replacing
-from facert.report.comparison import comparison_section
-from facert.report.sections import Fact, Report, Section
+from facert.pages.report.comparison import comparison_section
+from facert.pages.report.sections import Fact, Report, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
 
@@ -44,7 +44,7 @@ def write_report(report: Report, path: Path, overwrite: bool = False) -> None:
 
 @cache
 def _template() -> Template:
-    text = files("facert.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+    text = files("facert.pages.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -11,12 +11,12 @@ from facert.data.shared_controls import SharedControls, require_shared, shared_c
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError
-from facert.metrics import Comparison, compare
+from facert.evaluation.metrics import Comparison, compare
+from facert.pages.report.pictures import embedded
+from facert.pages.report.sections import Fact, Picture, Section, Table
 from facert.render.faces import choose_frames, posed_face, require_poses
 from facert.render.plots import plot_controls
 from facert.render.sheet import render_sheet
-from facert.report.pictures import embedded
-from facert.report.sections import Fact, Picture, Section, Table
 
 FACES = 6
 PIXELS = 240  # a face a side: a page shows six beside each other

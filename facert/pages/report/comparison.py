@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from facert.metrics import Comparison
-from facert.report.sections import Section, Table
+from facert.evaluation.metrics import Comparison
+from facert.pages.report.sections import Section, Table
 
 ALL = "all"
 
