@@ -31,8 +31,8 @@ def command(
     says at its top how to run it.
     """
     from facert.cli import console
-    from facert.importers import script
     from facert.io.atomic import replacing
+    from facert.io.importers import script
 
     text = script(program.value)
     if output is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from facert.importers import PROGRAMS, script
+from facert.io.importers import PROGRAMS, script
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -7,14 +7,14 @@ from importlib.resources import files
 PROGRAMS = ("blender", "maya")
 
 _FUTURE = "from __future__ import annotations\n"
-_SHARED = "from facert.importers.curves import"
+_SHARED = "from facert.io.importers.curves import"
 
 
 def script(program: str) -> str:
     """The script for one of `PROGRAMS`, with all that it needs in it.
 
-    It is this package's module for the program, with the text of `facert.importers.curves` in the
-    place of its import.
+    It is this package's module for the program, with the text of `facert.io.importers.curves` in
+    the place of its import.
     """
     folder = files(__name__)
     own = (folder / f"{program}.py").read_text(encoding="utf-8").splitlines(keepends=True)

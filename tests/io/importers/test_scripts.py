@@ -13,10 +13,10 @@ import pytest
 
 from facert.data.names import ARKIT_SHAPES
 from facert.data.take import Source, Take
-from facert.importers import PROGRAMS, script
-from facert.importers.curves import find, keys, read_curves, spelling
 from facert.io.curves import write_curves
 from facert.io.formats import write_take_file
+from facert.io.importers import PROGRAMS, script
+from facert.io.importers.curves import find, keys, read_curves, spelling
 
 VALUES = np.array([[0.1, 0.5], [np.nan, 0.5], [0.3, 0.5]])
 TAKE = Take([0.5, 0.54, 0.58], Source(VALUES, ("jawOpen", "eyeBlink_L")), fps=25.0)
