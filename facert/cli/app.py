@@ -11,9 +11,8 @@ import typer
 from typer.core import TyperGroup
 
 import facert
-from facert.cli import (
+from facert.cli.commands import (
     clean,
-    console,
     convert,
     demo,
     drive,
@@ -35,6 +34,7 @@ from facert.cli import (
     train,
     view,
 )
+from facert.cli.shared import console
 from facert.errors import FacertError
 
 ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")

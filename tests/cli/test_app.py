@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from facert.cli import app, inspect
+from facert.cli import app
+from facert.cli.commands import inspect
 from facert.io.formats import write_take_file
 
 

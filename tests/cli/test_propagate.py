@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.cli import drive, propagate
+from facert.cli.commands import drive, propagate
 from facert.data.take import Source
 from facert.topology import driving, propagation
 from facert.topology.takes import Propagation, propagate_poses

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import facert as api
-from facert.cli.train import _shown
+from facert.cli.commands.train import _shown
 from facert.retarget.checkpoint import checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import typer
 
-from facert.cli import console
+from facert.cli.shared import console
 from facert.errors import FacertError, InputError, OutputExistsError
 
 Work = Callable[[Path, Path], None]

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.batch import carry_out, plan
-from facert.cli.options import (
+from facert.cli.commands.train import DEFAULT_MODEL
+from facert.cli.shared import console
+from facert.cli.shared.batch import carry_out, plan
+from facert.cli.shared.options import (
     CONTROLS,
     DEVICE,
     ENDING,
@@ -24,7 +25,6 @@ from facert.cli.options import (
     SIGMA,
     chosen_handling,
 )
-from facert.cli.train import DEFAULT_MODEL
 from facert.data.text import plural
 from facert.errors import reading
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from facert.cli import console
+from facert.cli.shared import console
 
 if TYPE_CHECKING:
     from facert.data.take import Take

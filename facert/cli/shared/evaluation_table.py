@@ -10,7 +10,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from facert.cli import console
+from facert.cli.shared import console
 from facert.data.text import plural
 from facert.evaluation.summary import Row, best
 

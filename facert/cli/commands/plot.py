@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, TARGET
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -30,7 +30,7 @@ def command(
     overwrite: OVERWRITE = False,
 ) -> None:
     """Draw controls over time, with their uncertainty and the truth."""
-    from facert.cli.pictures import require_picture_name, save_picture
+    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.io.formats import read_take_file, targets_for
     from facert.render.faces import require_poses
     from facert.render.plots import plot_controls

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from facert.cli.options import TARGET
+from facert.cli.shared.options import TARGET
 from facert.errors import reading
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from facert.cli import console
-from facert.cli.train import DEFAULT_MODEL
+from facert.cli.commands.train import DEFAULT_MODEL
+from facert.cli.shared import console
 from facert.errors import InputError, OutputExistsError, reading
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
 
     require_viser()
-    from facert.cli.view import actor_of
+    from facert.cli.commands.view import actor_of
     from facert.pages.pose_page import PosePage
 
     if files.rig is None:

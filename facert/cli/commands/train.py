@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
 from facert.settings import OF_SHARED, Settings
@@ -137,7 +137,7 @@ def command(
     }
 
     import facert
-    from facert.cli.progress import ProgressBar
+    from facert.cli.shared.progress import ProgressBar
     from facert.methods import method_class
     from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.batch import carry_out, plan, require_kept
-from facert.cli.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
+from facert.cli.shared import console
+from facert.cli.shared.batch import carry_out, plan, require_kept
+from facert.cli.shared.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
 
 if TYPE_CHECKING:
-    from facert.cli.conversion import Wanted
+    from facert.cli.shared.conversion import Wanted
     from facert.data.conversion import Changes
 
 
@@ -83,7 +83,7 @@ def command(
     shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
     does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
     """
-    from facert.cli.conversion import ENDINGS, Wanted
+    from facert.cli.shared.conversion import ENDINGS, Wanted
     from facert.data.conversion import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
@@ -112,7 +112,7 @@ def _convert(
     source: Path, output: Path, *, wanted: Wanted, changes: Changes, overwrite: bool
 ) -> None:
     """One file."""
-    from facert.cli.conversion import convert_file
+    from facert.cli.shared.conversion import convert_file
 
     said = convert_file(source, output, wanted, changes, overwrite)
     console.out.print(f"{output}: {said}", markup=False)

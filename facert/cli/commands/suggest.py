@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def command(
     """
     import json
 
-    from facert.cli.pictures import require_picture_name, save_picture
+    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.posing.suggestion import suggest_frames

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, TARGET
 from facert.data.text import plural
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -55,8 +55,8 @@ def command(
 
     A sheet shows some frames, by default such as differ well; a clip shows the motion.
     """
-    from facert.cli.faces import open_face
-    from facert.cli.pictures import ENDINGS, require_picture_name
+    from facert.cli.shared.faces import open_face
+    from facert.cli.shared.pictures import ENDINGS, require_picture_name
     from facert.errors import reading
     from facert.io.formats import read_rig_file, targets_for
 
@@ -87,7 +87,7 @@ def _sheet(
     overwrite: bool,
 ) -> str:
     """Draw some frames of every face; return which."""
-    from facert.cli.pictures import save_picture
+    from facert.cli.shared.pictures import save_picture
     from facert.render.faces import choose_frames, outline, require_part, require_poses
     from facert.render.sheet import render_sheet
 

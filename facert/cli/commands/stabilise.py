@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from facert.cli import console
-from facert.cli.batch import require_other_file
-from facert.cli.options import NO_DETECT, OVERWRITE, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.batch import require_other_file
+from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -52,7 +52,7 @@ def command(
     than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
     as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
     """
-    from facert.cli.cleaned_take import read_observed, write_beside
+    from facert.cli.shared.cleaned_take import read_observed, write_beside
     from facert.io.formats import read_source_file, require_take_output, targets_for
     from facert.preprocess.head_motion import stabilise
 

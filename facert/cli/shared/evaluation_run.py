@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
 import facert
-from facert.cli import console
+from facert.cli.shared import console
 from facert.data.ranges import parse_range
 from facert.data.text import plural
 from facert.evaluation.cells import Outcome

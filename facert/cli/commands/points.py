@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, SHAPES
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, SHAPES
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def suggest(
     The numbers are those of the picture. The last line has the vertices with commas between them,
     as `facert simulate --vertices` takes them.
     """
-    from facert.cli.pictures import require_picture_name, save_picture
+    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.render.points import draw_points

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_handling
-from facert.cli.train import DEFAULT_MODEL
+from facert.cli.commands.train import DEFAULT_MODEL
+from facert.cli.shared import console
+from facert.cli.shared.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_handling
 
 if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
@@ -96,7 +96,7 @@ def command(
     A status line shows rate, latency, and packets that were dropped or bad. Files are written at
     the end.
     """
-    from facert.cli.live_status import Status, print_summary
+    from facert.cli.shared.live_status import Status, print_summary
     from facert.errors import reading
     from facert.live.endpoints import File, parse_input, parse_output
     from facert.live.loop import Limits, Session

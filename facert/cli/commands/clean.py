@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.batch import carry_out, plan
-from facert.cli.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGMA, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.batch import carry_out, plan
+from facert.cli.shared.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGMA, TARGET
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _clean(
     overwrite: bool,
 ) -> None:
     """One take."""
-    from facert.cli.cleaned_take import read_observed, write_beside
+    from facert.cli.shared.cleaned_take import read_observed, write_beside
     from facert.retarget.options import Handling
 
     take = read_observed(source, target, no_detect)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from facert.cli.options import OVERWRITE
+from facert.cli.shared.options import OVERWRITE
 
 
 class Program(StrEnum):
@@ -30,7 +30,7 @@ def command(
     It keys the shape keys of a Blender object, or the attributes of a Maya node, by time, and
     says at its top how to run it.
     """
-    from facert.cli import console
+    from facert.cli.shared import console
     from facert.io.atomic import replacing
     from facert.io.importers import script
 

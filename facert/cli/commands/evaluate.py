@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import DEVICE, OVERWRITE, SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import DEVICE, OVERWRITE, SHAPES, TARGET
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods import REGISTRY
@@ -93,9 +93,9 @@ def command(
     if across is not None and split is not Split.random:
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
-    from facert.cli.evaluation_run import Asked, open_journal, run_cells
-    from facert.cli.evaluation_table import error_table
-    from facert.cli.pictures import save_picture
+    from facert.cli.shared.evaluation_run import Asked, open_journal, run_cells
+    from facert.cli.shared.evaluation_table import error_table
+    from facert.cli.shared.pictures import save_picture
     from facert.evaluation.advice import advise
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
@@ -137,7 +137,7 @@ def command(
 
 def _require_outputs(json_path: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Refuse names that cannot be written to, before hours of work are done."""
-    from facert.cli.pictures import require_picture_name
+    from facert.cli.shared.pictures import require_picture_name
 
     if json_path is not None and json_path.exists() and not overwrite:
         raise OutputExistsError(json_path)

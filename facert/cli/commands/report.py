@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError
 

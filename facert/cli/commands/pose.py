@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import OVERWRITE, SHAPES, TARGET
-from facert.cli.train import DEFAULT_MODEL
+from facert.cli.commands.train import DEFAULT_MODEL
+from facert.cli.shared import console
+from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def command(
 ) -> None:
     """Find the most probable whole pose given a few controls; or pose with sliders (--view)."""
     if view:
-        from facert.cli.pose_view import Files, open_page
+        from facert.cli.shared.pose_view import Files, open_page
 
         files = Files(rig, take, model, actor, output, target, shapes)
         return open_page(files, overwrite, host, port)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import SHAPES, TARGET
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -61,7 +61,7 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 
 def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Of a model, for people: the settings that its method uses, and plain names of figures."""
-    from facert.cli.train import FOR_PEOPLE
+    from facert.cli.commands.train import FOR_PEOPLE
     from facert.methods import method_class
     from facert.settings import OF_SHARED
 

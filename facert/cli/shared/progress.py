@@ -7,7 +7,7 @@ from types import TracebackType
 
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from facert.cli import console
+from facert.cli.shared import console
 from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor
 

@@ -15,7 +15,7 @@ from typing import Any
 import typer
 from rich.live import Live
 
-from facert.cli import console
+from facert.cli.shared import console
 from facert.live.frames import Counters
 from facert.live.loop import Session
 from facert.live.meter import RECENT, Pace

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli import console
-from facert.cli.options import SHAPES, TARGET
+from facert.cli.shared import console
+from facert.cli.shared.options import SHAPES, TARGET
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:

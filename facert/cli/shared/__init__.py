@@ -1,0 +1,1 @@
+"""What commands share: options, batches, the console, progress, pictures."""
