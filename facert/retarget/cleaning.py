@@ -39,8 +39,7 @@ class Cleaned:
 
 
 def clean(take: Take, sigma: float | None = None) -> Cleaned:
-    """Fill gaps and remove noise by what the take itself tells, see
-    `facert.preprocess.motion.estimate`.
+    """Fill gaps and remove noise by the take's own motion, `facert.preprocess.motion.estimate`.
 
     Parameters
     ----------
