@@ -26,7 +26,7 @@ This page is written by `make docs`, from the docstrings.
 OTHERS = {
     "facert.posing.suggestion": ("Suggestion",),
     "facert.posing.pose": ("CompletedPose",),
-    "facert.retarget.options": ("Handling",),
+    "facert.retarget.options": ("RetargetOptions",),
     "facert.retarget.adjustments": ("Adjustments",),
     "facert.retarget.stream": ("RetargetStream", "Streamed"),
 }

@@ -22,8 +22,7 @@ from experiments.grid import RESULTS
 from experiments.report import markdown, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data.arrays import FloatArray
-from facert.evaluation.metrics import rms
+from facert.data.arrays import FloatArray, rms
 from facert.methods.shared_gplvm import SOONER
 from facert.retarget.options import AS_IT_IS
 from facert.retarget.retargeter import Retargeter
@@ -57,7 +56,7 @@ def measured(truth: Take, labels: int, seed: int) -> FloatArray:
     known = truth.params[test]
 
     def error(model: Retargeter) -> float:
-        said = model.retarget(take, handling=AS_IT_IS).params
+        said = model.retarget(take, options=AS_IT_IS).params
         assert said is not None
         return rms(said[test] - known)
 

@@ -23,9 +23,8 @@ from threadpoolctl import threadpool_limits
 from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
-from facert.data.arrays import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray, rms
 from facert.data.normalisation import Normalisation
-from facert.evaluation.metrics import rms
 from facert.preprocess.gaps import Gaussian
 from facert.preprocess.motion.estimate import estimate
 from facert.preprocess.motion.interpolation import interpolated

@@ -22,8 +22,7 @@ from experiments.posing import PROBLEMS, RESULTS, TUNED, Row
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data.arrays import FloatArray, IntArray
-from facert.evaluation.metrics import rms
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.posing.completion import Completion
 from facert.posing.correction import correct
 from facert.posing.pose import known_poses
@@ -49,7 +48,7 @@ def retarget(track: Take, seed: int) -> Retargeted:
     assert track.params is not None
     take, test = draw(track, LABELS, POSES - LABELS, seed)
     retargeter = facert.train(take, Settings(seed=seed, detect=False, smooth=False))
-    result = retargeter.retarget(take, handling=AS_IT_IS)
+    result = retargeter.retarget(take, options=AS_IT_IS)
     assert result.params is not None
     assert result.std is not None
     some = np.random.default_rng(seed).permutation(test)[:TESTED]

@@ -16,7 +16,7 @@ from experiments.grid import DEFAULT
 from facert.evaluation.figures import COLOURS, INK, NAMES, Axis
 from facert.evaluation.summary import Row
 from facert.io.atomic import replacing
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 
 COLUMNS = 3  # a line for each target: of three tracks, three, and two with the legend beside
 INKS = 128  # colours of a picture, enough for smooth lines

@@ -24,9 +24,8 @@ from threadpoolctl import threadpool_limits
 import facert
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
-from facert.evaluation.metrics import rms
 from facert.retarget.options import AS_IT_IS
 
 
@@ -49,7 +48,7 @@ def gpr(take: Take, frames: FloatArray) -> FloatArray:
 def shared(take: Take, settings: Settings) -> FloatArray:
     """Poses of every frame of the take by a shared model."""
     settings = replace(settings, detect=False, smooth=False)
-    result = facert.train(take, settings).retarget(take, handling=AS_IT_IS)
+    result = facert.train(take, settings).retarget(take, options=AS_IT_IS)
     assert result.params is not None
     return result.params
 

@@ -23,7 +23,7 @@ from facert.evaluation.cells import Outcome
 from facert.evaluation.protocol import Problem, Protocol, make_problem
 from facert.evaluation.run import Grid, fingerprint, run
 from facert.io.journal import Journal
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 
 log = logging.getLogger(__name__)
 

@@ -2,12 +2,12 @@
 
     python -m experiments.posing [--quick]
 
-From 100 or 400 poses of a track, drawn at random, the rest of other poses is foretold from their 2,
-3 and 5 most varying controls, or from random ones that move. All methods are clipped to the range
-of the known poses. What foretells the pose was chosen on `utterance_a` and `optical_cheeks`; the
-constants behind its standard deviation were seen on all tracks. The last column of the tables is
-the RMS error divided by the RMS standard deviation.
-Writes `experiments/results/posing.csv`, `.md` and `.png`.
+From 100 or 400 poses of a track, drawn at random, the rest of other poses is predicted from their
+2, 3 and 5 most varying controls, or from random ones that move. All methods are clipped to the
+range of the known poses. What predicts the pose was chosen on `utterance_a` and `optical_cheeks`;
+the constants behind its standard deviation were seen on all tracks. The last column of the tables
+is the RMS error divided by the RMS standard deviation. Writes `experiments/results/posing.csv`,
+`.md` and `.png`.
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ from experiments.drawing import save
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Take
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.normalisation import Normalisation
 from facert.data.take import Source
-from facert.evaluation.metrics import rms
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
 from facert.models.gp.regression import maximise_likelihood
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
@@ -86,18 +85,18 @@ class Problem:
         return self.known[:, self.given], self.known[:, self.rest], self.test[:, self.given]
 
 
-Foretell = Callable[[Problem], FloatArray]
+Predict = Callable[[Problem], FloatArray]
 
 
-def mean_of_nearest(count: int) -> Foretell:
+def mean_of_nearest(count: int) -> Predict:
     """The mean of the known poses that are nearest in the given controls."""
 
-    def foretell(problem: Problem) -> FloatArray:
+    def predict(problem: Problem) -> FloatArray:
         given, rest, values = problem.parts
         nearest = np.argsort(cdist(values, given), axis=1, kind="stable")[:, :count]
         return np.asarray(rest[nearest].mean(axis=1))
 
-    return foretell
+    return predict
 
 
 def conditional_gaussian(problem: Problem) -> FloatArray:
@@ -120,7 +119,7 @@ def direct_regression(problem: Problem) -> FloatArray:
     return outputs.undo(kernel.cross(inputs.apply(values), X) @ alpha)
 
 
-def latent_model(track: Take, known: int, seed: int) -> Foretell:
+def latent_model(track: Take, known: int, seed: int) -> Predict:
     """The paper's: the most probable latent point of the target view, given some controls."""
     labels = min(40, known // 2)
     take, _ = draw(track, labels, known - labels, seed)
@@ -129,14 +128,14 @@ def latent_model(track: Take, known: int, seed: int) -> Foretell:
     assert isinstance(method, SemiSupervisedSGPLVM)
     target = method.target_
 
-    def foretell(problem: Problem) -> FloatArray:
+    def predict(problem: Problem) -> FloatArray:
         variance = np.full(problem.test.shape, np.inf)
         variance[:, problem.given] = EXACT
         seen = Observation(np.where(np.isinf(variance), 0.0, units.apply(problem.test)), variance)
         z = SourceMapping(target).solve(seen).z
         return units.undo(target.predict(z).mean)[:, problem.rest]
 
-    return foretell
+    return predict
 
 
 def measure(track: Take, known: int, seed: int, randoms: int) -> Iterator[Row]:
@@ -145,7 +144,7 @@ def measure(track: Take, known: int, seed: int, randoms: int) -> Iterator[Row]:
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(track))
     poses, test = track.params[order[:known]], track.params[order[known : known + TESTED]]
-    methods: dict[str, Foretell] = {
+    methods: dict[str, Predict] = {
         "nearest pose": mean_of_nearest(1),
         "mean of 8 nearest": mean_of_nearest(8),
         "conditional Gaussian": conditional_gaussian,
@@ -163,7 +162,7 @@ def measure(track: Take, known: int, seed: int, randoms: int) -> Iterator[Row]:
             yield facts | errors_of(Problem(poses, test, given), methods)
 
 
-def errors_of(problem: Problem, methods: Mapping[str, Foretell]) -> Row:
+def errors_of(problem: Problem, methods: Mapping[str, Predict]) -> Row:
     """RMS of each method over the rest, clipped alike; the calibration of our std; how long."""
     truth, rest = problem.test[:, problem.rest], problem.rest
     bounds = np.stack([problem.known.min(axis=0), problem.known.max(axis=0)], axis=1)

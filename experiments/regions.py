@@ -30,11 +30,10 @@ from experiments.grid import KEPT, OPTICAL, RESULTS, TARGETS, kinds
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take, train
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.names import control_groups
 from facert.data.regions import AUTO
 from facert.evaluation.comparison import Estimate, paired_ratio
-from facert.evaluation.metrics import rms
 from facert.io.journal import Journal, source_digest
 from facert.retarget.options import AS_IT_IS
 
@@ -130,7 +129,7 @@ def measure(face: Face, case: Case, regions: str | None, seed: int) -> Scores:
     known = np.where(np.isin(rows, labels)[:, None], face.poses[rows], np.nan)
     given = replace(_part(face.take, noisy, rows), params=known, animation=face.poses[poses])
     settings = Settings(method=case.method, seed=seed, regions=regions, smooth=False, detect=False)
-    result = train(given, settings).retarget(_part(face.take, noisy, test), handling=AS_IT_IS)
+    result = train(given, settings).retarget(_part(face.take, noisy, test), options=AS_IT_IS)
     assert result.params is not None
     return _scores(face, result.params, test)
 

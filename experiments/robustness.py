@@ -35,11 +35,10 @@ from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.normalisation import Normalisation
 from facert.evaluation.figures import COLOURS, INK, MARKERS
-from facert.evaluation.metrics import rms
-from facert.retarget.options import AS_IT_IS, Handling
+from facert.retarget.options import AS_IT_IS, RetargetOptions
 from facert.retarget.retargeter import Mode
 
 KINDS, SHARES, NOISES = cleaning.KINDS, (0.1, 0.2, 0.4), (0.0, 0.05, 0.1, 0.2)
@@ -136,7 +135,7 @@ def measure(cell: Cell) -> dict[str, object]:
             source = spoilt.take.source.with_matrix(spoilt.units.undo(filled))
             take = replace(spoilt.take, source=source)
             settings = Settings(method="gpr", seed=cell.seed, detect=False, smooth=False)
-            found = facert.train(take, settings).retarget(take, handling=AS_IT_IS)
+            found = facert.train(take, settings).retarget(take, options=AS_IT_IS)
             record[name] = spoilt.error(found)
             record[f"{name}, hidden"] = _hidden(spoilt, filled)
     return record
@@ -163,13 +162,13 @@ def motion(cell: Cell) -> dict[str, object]:
         record["learned clean RMS"] = clean.error(learned_clean)
         for part, height in _heights(reference, learned_clean).items():
             record[f"learned clean {part}"] = height
-        ways: dict[str, tuple[Mode, Handling | None]] = {
+        ways: dict[str, tuple[Mode, RetargetOptions | None]] = {
             "offline": ("offline", None),
             "online": ("online", None),
-            "frame by frame": ("offline", Handling(smooth=False)),
+            "frame by frame": ("offline", RetargetOptions(smooth=False)),
         }
-        for name, (mode, handling) in ways.items():
-            result = retargeter.retarget(spoilt.take, mode, handling)
+        for name, (mode, options) in ways.items():
+            result = retargeter.retarget(spoilt.take, mode, options)
             assert result.params is not None
             record[f"{name} RMS"] = spoilt.error(result)
             record[f"{name} jitter"] = float(np.abs(np.diff(result.params, 2, axis=0)).mean())

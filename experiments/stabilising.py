@@ -22,8 +22,7 @@ from experiments.grid import RESULTS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Source, Take
-from facert.data.arrays import FloatArray
-from facert.evaluation.metrics import rms
+from facert.data.arrays import FloatArray, rms
 from facert.mesh.rigid import RigidMotion, align
 from facert.preprocess.head_motion import stabilise
 

@@ -23,9 +23,8 @@ from experiments.grid import OPTICAL, RESULTS, TARGETS, begin_log, kinds, log
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take, train
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.evaluation.comparison import Estimate, paired_ratio
-from facert.evaluation.metrics import rms
 from facert.posing.suggestion import suggest_frames
 from facert.retarget.options import AS_IT_IS
 
@@ -94,7 +93,7 @@ def error(take: Take, draw: Draw, labels: IntArray, method: str) -> float:
     nothing = np.empty(0, dtype=np.int64)
     settings = Settings(method=method, seed=draw.seed, detect=False, smooth=False)
     result = train(given, settings).retarget(
-        part(take, draw.test, nothing, nothing), handling=AS_IT_IS
+        part(take, draw.test, nothing, nothing), options=AS_IT_IS
     )
     assert result.params is not None
     return rms(result.params - take.params[draw.test])

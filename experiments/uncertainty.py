@@ -24,8 +24,7 @@ from experiments.grid import OPTICAL, RESULTS, SPEECH, kinds
 from experiments.report import markdown, write_text
 from experiments.robustness import Cell, spoil
 from facert import Settings
-from facert.data.arrays import FloatArray
-from facert.evaluation.metrics import rms
+from facert.data.arrays import FloatArray, rms
 
 NOISES = (0.0, 0.05)
 SHARE = 0.2  # of the markers, on average, that are hidden

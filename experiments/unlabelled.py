@@ -34,8 +34,7 @@ from experiments.grid import KEPT, RESULTS, code_of
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take
-from facert.data.arrays import IntArray
-from facert.evaluation.metrics import rms
+from facert.data.arrays import IntArray, rms
 from facert.io.journal import Journal
 
 log = logging.getLogger(__name__)

@@ -55,7 +55,7 @@ _HOMES = {
     "FacertError": ("facert.errors", "FacertError"),
     "InputError": ("facert.errors", "InputError"),
     "Retargeter": ("facert.retarget.retargeter", "Retargeter"),
-    "Rig": ("facert.data.take", "Rig"),
+    "Rig": ("facert.data.rig", "Rig"),
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),

@@ -4,7 +4,7 @@ import pytest
 
 from facert.errors import InputError
 from facert.io.toml import read_toml
-from facert.methods import REGISTRY, method_class
+from facert.methods.registry import REGISTRY, method_class
 from facert.settings import Settings
 
 

@@ -14,8 +14,8 @@ from experiments.bench.figure import Figure, cpu_seconds
 from experiments.bench.problem import bench_data, bench_frames
 from facert import Settings
 from facert.data.arrays import FloatArray
-from facert.methods import make_method
 from facert.methods.base import Method
+from facert.methods.registry import make_method
 from facert.models.threads import threads_for
 
 METHODS = ("auto", "ssgplvm", "ssgpr", "gpr", "svr")

@@ -27,8 +27,8 @@ from experiments.tracks import DATA, read_track
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.methods.registry import make_method
 from facert.models.gplvm.lle import constraint_matrix
 from facert.models.gplvm.module import SharedGPLVM
 from facert.models.gplvm.sparse_module import SparseSharedGPLVM

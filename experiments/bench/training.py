@@ -15,9 +15,9 @@ from experiments.bench.problem import bench_data
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.methods import make_method
 from facert.methods.base import Labelled, Report
 from facert.methods.noise import with_noise
+from facert.methods.registry import make_method
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
 from facert.models.optim.base import Result
 from facert.models.optim.flat import FlatObjective

@@ -13,7 +13,7 @@ DAMAGED = "The model file is damaged: train it again."
 
 
 @dataclass(frozen=True, eq=False)
-class Arrays:
+class ArrayGroup:
     """Arrays that were learned together; a field may be a group of such arrays itself.
 
     `axes` spells the shape of each array, a letter an axis. A letter stands for one size in all of
@@ -27,7 +27,7 @@ class Arrays:
     """
 
     axes: ClassVar[Mapping[str, str]]
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {}
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {}
 
     def __post_init__(self) -> None:
         check_axes(self.arrays, self.all_axes())

@@ -96,3 +96,8 @@ def require_plain(text: str, path: str) -> None:
         raise InputError(
             path, "text without control characters", repr(text[:60]), "Write plain text."
         )
+
+
+def rms(errors: FloatArray) -> float:
+    """Root mean square over everything, the papers' measure."""
+    return float(np.sqrt(np.mean(np.square(errors))))

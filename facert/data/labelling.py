@@ -188,3 +188,8 @@ def _has_shape(name: str, rig: Rig) -> bool:
     except InputError:
         return False
     return True
+
+
+def predicted_poses(take: Take) -> int:
+    """How many of the posed frames have a standard deviation: a model predicted them."""
+    return 0 if take.std is None else int((take.std[take.labels] > 0).any(axis=1).sum())

@@ -122,7 +122,7 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
     began = time.perf_counter()
     retargeter = train(training, settings)
     trained = time.perf_counter()
-    result: Take = retargeter.retarget(frames, handling=AS_IT_IS, device=settings.device)
+    result: Take = retargeter.retarget(frames, options=AS_IT_IS, device=settings.device)
     ended = time.perf_counter()
     assert result.params is not None  # retarget poses every frame
     errors = result.params - true_poses(problem, chosen)

@@ -6,15 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.names import control_groups, shape_drivers
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
-
-
-def rms(errors: FloatArray) -> float:
-    """Root mean square over everything, the papers' measure."""
-    return float(np.sqrt(np.mean(np.square(errors))))
 
 
 @dataclass(frozen=True)

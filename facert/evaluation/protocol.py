@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.labelling import predicted_poses
 from facert.data.names import match
 from facert.data.normalisation import Normalisation
 from facert.data.rig import Rig
@@ -21,7 +22,6 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.metrics import vertex_gram
 from facert.preprocess.training_set import MIN_OBSERVED
-from facert.retarget.label_checks import foretold_poses
 
 Split = Literal["random", "block"]
 
@@ -303,9 +303,9 @@ def _check_posed(take: Take) -> None:
         raise InputError(
             "/target/params", "known poses", "none", "Evaluate on a take with the true poses."
         )
-    foretold = foretold_poses(take)
-    if foretold:
-        found = f"{plural(foretold, 'pose')} that a model foretold"
+    predicted = predicted_poses(take)
+    if predicted:
+        found = f"{plural(predicted, 'pose')} that a model predicted"
         raise InputError("/target/std", "true poses", found, "Give the take that was posed.")
 
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data.labelling import Poses, poses_of
+from facert.data.labelling import Poses, poses_of, predicted_poses
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.formats import read_take_file
 from facert.io.text import check_width, read_csv, read_header, to_numbers
-from facert.retarget.label_checks import foretold_poses
 
 log = logging.getLogger("facert")
 
@@ -30,7 +29,7 @@ def read_poses(path: Path, fps: float | None = None) -> Poses:
     ------
     InputError
         When the file cannot be read, a row names no frame, there are no poses in it, or a model
-        foretold them all.
+        predicted them all.
     """
     path = Path(path)
     with reading(path):
@@ -42,19 +41,19 @@ def read_poses(path: Path, fps: float | None = None) -> Poses:
 
 
 def _require_set(take: Take, path: Path) -> None:
-    """Refuse a result of retargeting: what a model foretold would pass for somebody's poses."""
-    foretold = foretold_poses(take)
-    if foretold and foretold == len(take.labels):
+    """Refuse a result of retargeting: what a model predicted would pass for somebody's poses."""
+    predicted = predicted_poses(take)
+    if predicted and predicted == len(take.labels):
         raise InputError(
             "/target/std",
             "poses that somebody set",
-            f"a standard deviation for all {foretold}: a model foretold them",
+            f"a standard deviation for all {predicted}: a model predicted them",
             f"Give the poses that were set; to take these nonetheless, make a table of them first: "
             f"facert convert {path.name} {path.stem}.csv.",
         )
-    if foretold:
-        poses = plural(foretold, "pose")
-        log.warning("%s: %s with a standard deviation: foretold, taken as set", path.name, poses)
+    if predicted:
+        poses = plural(predicted, "pose")
+        log.warning("%s: %s with a standard deviation: predicted, taken as set", path.name, poses)
 
 
 def _names_frames(header: tuple[str, ...]) -> bool:

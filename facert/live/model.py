@@ -20,7 +20,7 @@ from facert.live.frames import Frame
 from facert.live.placement import PlacementWatch
 from facert.live.rest import RestWatch
 from facert.preprocess.live_faults import MarkerWatch
-from facert.retarget.options import Handling
+from facert.retarget.options import RetargetOptions
 
 if TYPE_CHECKING:
     from facert.data.arrays import FloatArray
@@ -47,7 +47,7 @@ class Loaded:
     Parameters
     ----------
     retargeter : Retargeter
-    handling : Handling
+    options : RetargetOptions
     stream : RetargetStream
         Maps the session's frames, which are taken to come at `fps`.
     twin : RetargetStream
@@ -55,7 +55,7 @@ class Loaded:
     """
 
     retargeter: Retargeter
-    handling: Handling
+    options: RetargetOptions
     stream: RetargetStream
     twin: RetargetStream
     fps: float | None
@@ -112,7 +112,7 @@ class LiveModel:
         With the names, kind and units of the frames.
     fps : float, optional
         Nominal frames a second; measured when they are not known.
-    handling : callable, optional
+    options : callable, optional
         What is done about bad markers, noise and single controls, for a model.
     rest_seconds : float, optional
         At the session's start in which the actor rests; from then on frames are calibrated.
@@ -129,18 +129,18 @@ class LiveModel:
         retargeter: Retargeter,
         pattern: Take,
         fps: float | None = None,
-        handling: Callable[[Retargeter], Handling] | None = None,
+        options: Callable[[Retargeter], RetargetOptions] | None = None,
         rest_seconds: float | None = None,
     ) -> None:
         self._file, self._pattern, self._fps = file, pattern, fps
-        self._handling = handling or (lambda _: Handling())
+        self._options = options or (lambda _: RetargetOptions())
         self._loaded = self._prepare(retargeter)
         self._next: Loaded | None = None
         self._times: list[float] = []
         self._rest: FloatArray | None = None
         self._rest_watch = None
         if rest_seconds is not None:
-            seen = self._loaded.handling.detect and pattern.source.kind == "markers"
+            seen = self._loaded.options.detect and pattern.source.kind == "markers"
             watch = MarkerWatch(len(pattern.source.names)) if seen else None
             self._rest_watch = RestWatch(rest_seconds, watch)
         self._placement: PlacementWatch | None = None
@@ -220,23 +220,23 @@ class LiveModel:
             if _is_near(self._fps, self.retargeter):
                 self._loaded = replace(self._loaded, fps=self._fps)
             else:
-                self._use(self._with_streams(self.retargeter, self._loaded.handling))
+                self._use(self._with_streams(self.retargeter, self._loaded.options))
 
     def _use(self, loaded: Loaded) -> None:
         if loaded.fps != self._fps:  # which was measured since
-            loaded = self._with_streams(loaded.retargeter, loaded.handling)
+            loaded = self._with_streams(loaded.retargeter, loaded.options)
         self._loaded = loaded
         if self._rest is not None:
             loaded.calibrate(self._rest)
 
-    def _with_streams(self, retargeter: Retargeter, handling: Handling) -> Loaded:
+    def _with_streams(self, retargeter: Retargeter, options: RetargetOptions) -> Loaded:
         names = self._pattern.source.names
-        stream = retargeter.stream(names, self._fps, handling)
-        deaf, motion = handling, retargeter.motion
-        if handling.sigma is None and motion is not None:  # a twin has no noise to measure
-            deaf = replace(handling, sigma=motion.sigma * retargeter.source_units.scale)
+        stream = retargeter.stream(names, self._fps, options)
+        deaf, motion = options, retargeter.motion
+        if options.sigma is None and motion is not None:  # a twin has no noise to measure
+            deaf = replace(options, sigma=motion.sigma * retargeter.source_units.scale)
         twin = retargeter.stream(names, self._fps, deaf)
-        return Loaded(retargeter, handling, stream, twin, self._fps)
+        return Loaded(retargeter, options, stream, twin, self._fps)
 
     def _prepare(self, retargeter: Retargeter) -> Loaded:
         """A stream for the session's frames, after one that made all code and caches warm."""
@@ -247,7 +247,7 @@ class LiveModel:
         warming = retargeter.stream(retargeter.source_names, self._fps)
         for _ in range(_WARMING):
             warming.step(rest)
-        return self._with_streams(retargeter, self._handling(retargeter))
+        return self._with_streams(retargeter, self._options(retargeter))
 
     def _watch(self) -> None:
         while not self._stop.wait(LOOK_EVERY):

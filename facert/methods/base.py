@@ -82,7 +82,7 @@ class Report:
 class Stream(Protocol):
     """Maps one frame after the other, each with the memory of those before."""
 
-    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """The prediction for one more frame, (1, d_x); see `Method.predict`."""
         ...
 
@@ -122,14 +122,14 @@ class Method(Protocol):
         """Learn from labelled frames and whatever unlabelled data the method can use."""
         ...
 
-    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own.
 
         Parameters
         ----------
         frames : array, shape (T, d_x)
             NaN: not observed.
-        doubt : array, shape (T, d_x), optional
+        input_variance : array, shape (T, d_x), optional
             Variance of each number, where it was not measured but filled in.
         """
         ...

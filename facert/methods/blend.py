@@ -1,4 +1,4 @@
-"""`auto`: the default, a blend of experts weighted by how well each foretells the labels.
+"""`auto`: the default, a blend of experts weighted by how well each predicts the labels.
 
 No one method suits all captures. Where the rig follows the markers linearly, factors that all
 frames and poses share are hard to beat (`facert.models.factors`); where skin and rig do not, a
@@ -29,9 +29,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import nnls
 
-from facert.data.array_group import Arrays
-from facert.data.arrays import FloatArray
-from facert.evaluation.metrics import rms
+from facert.data.array_group import ArrayGroup
+from facert.data.arrays import FloatArray, rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.factors import FactorMap, Trio, left_out_poses
 from facert.methods.one_frame import BlendFrame
@@ -73,7 +72,7 @@ class BlendMap(Map):
     """
 
     axes: ClassVar[Mapping[str, str]] = {"weights": "4", "range": "2y", "doubt": "y"}
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {
         "plain": FeatureProcess,
         "whitened": FeatureProcess,
         "factors": FactorMap,

@@ -23,7 +23,7 @@ def ranked_folds(X: FloatArray) -> list[tuple[IntArray, IntArray]]:
     """Training and test rows of each fold, whatever the order of the frames X (l, d_x).
 
     Ranked by their distance from the mean, frames go to the folds in turn: each fold holds calm
-    and extreme ones, and none has all the extremes to foretell from calm ones.
+    and extreme ones, and none has all the extremes to predict from calm ones.
     """
     ranks = np.argsort(np.sum((X - X.mean(axis=0)) ** 2, axis=1), kind="stable")
     folds = min(FOLDS, len(X))

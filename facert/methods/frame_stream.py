@@ -85,18 +85,18 @@ class FrameStream:
     def __init__(self, frame_map: FrameMap, gaps: Gaussian, response: FloatArray) -> None:
         self._map, self._gaps, self._response = frame_map, gaps, response
 
-    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x); see `facert.methods.base.Method.predict`."""
         frame = frame.copy()  # for who asks for the variance, when it may hold another one
         X = self._gaps.fill(frame)
         pose, tell = self._map(X[0])
         if tell is None:
             return FramePrediction(pose[None], X, None)
-        return FramePrediction(pose[None], X, lambda: tell() + self._unsure(frame, doubt))
+        return FramePrediction(pose[None], X, lambda: tell() + self._unsure(frame, input_variance))
 
-    def _unsure(self, frame: FloatArray, doubt: FloatArray | None) -> FloatArray:
+    def _unsure(self, frame: FloatArray, input_variance: FloatArray | None) -> FloatArray:
         """Variance of the pose (d_y,) by what the frame did not show."""
         _, variance = self._gaps.fill_for(frame, self._response)
-        if doubt is not None:
-            variance += np.nan_to_num(doubt) @ self._response**2
+        if input_variance is not None:
+            variance += np.nan_to_num(input_variance) @ self._response**2
         return np.asarray(variance[0])

@@ -15,11 +15,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, Arrays, check_axes
-from facert.data.arrays import FloatArray
+from facert.data.array_group import DAMAGED, ArrayGroup, check_axes
+from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.evaluation.metrics import rms
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.models.device import find_device
@@ -32,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Map(Arrays, ABC):
+class Map(ArrayGroup, ABC):
     """A trained map from complete frames to poses."""
 
     tells_std: ClassVar[bool] = True
@@ -141,11 +140,11 @@ class Regression(ABC):
         products = (frames - self.gaps_.mean).T @ (poses - poses.mean(axis=0)) / len(frames)
         return np.linalg.solve(self.gaps_.covariance, products).astype(np.float64)
 
-    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
         X, variance = self.gaps_.fill_for(frames, self.response_)
-        if doubt is not None:
-            variance = variance + np.nan_to_num(doubt) @ self.response_**2
+        if input_variance is not None:
+            variance = variance + np.nan_to_num(input_variance) @ self.response_**2
         Y, std = self.map_(X)
         return Prediction(Y, None if std is None else np.sqrt(std**2 + variance), X)
 

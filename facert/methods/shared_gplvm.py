@@ -114,10 +114,10 @@ class SemiSupervisedSGPLVM:
             self._set_views(module.source_posterior(X), module.target_posterior(Y))
         return Report(result, self._figures(labelled, unlabelled))
 
-    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
         with threads_for(len(self.source_.Z)):
-            return self._to_target(self.mapping_.solve(self._observed(frames, doubt)))
+            return self._to_target(self.mapping_.solve(self._observed(frames, input_variance)))
 
     def on(self, device: str) -> Self:
         """The same, mapping batches on a device; see `Method.on`."""
@@ -164,9 +164,9 @@ class SemiSupervisedSGPLVM:
         self.mapping_: SourceMapping = SourceMapping(source)
         self.to_poses_ = partial(map_to_target, target)
 
-    def _observed(self, frames: FloatArray, doubt: FloatArray | None) -> Observation:
+    def _observed(self, frames: FloatArray, input_variance: FloatArray | None) -> Observation:
         assert self.settings.sigma_c is not None  # filled in by fit, checked by load
-        return Observation.of(frames, self.settings.sigma_c, doubt)
+        return Observation.of(frames, self.settings.sigma_c, input_variance)
 
     def _to_target(self, mapped: Mapped) -> Prediction:
         if not mapped.converged.all():
@@ -316,9 +316,9 @@ class _SharedStream:
         self.method = method
         self.previous: Mapped | None = None
 
-    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
-        observed = self.method._observed(frame, doubt)
+        observed = self.method._observed(frame, input_variance)
         mapping = self.method.mapping_
         if self.previous is None:
             self.previous = mapping.solve(observed)

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data.array_group import Arrays
+from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray
 
 # Added to the covariance of all poses, relative to its mean variance: few poses leave it singular.
@@ -28,7 +28,7 @@ RIDGE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Shrinkage(Arrays):
+class Shrinkage(ArrayGroup):
     """What takes a predicted pose to a likely one.
 
     Parameters

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data.array_group import Arrays
+from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.gpr import ProcessMap
@@ -47,7 +47,7 @@ class FeatureProcess(Map):
     """
 
     axes: ClassVar[Mapping[str, str]] = {"centre": "x", "basis": "xx", "mean": "y"}
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {"process": ProcessMap}
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {"process": ProcessMap}
 
     centre: FloatArray
     basis: FloatArray
@@ -96,7 +96,7 @@ class ShrunkProcess(Map):
     """A process whose poses are shrunk towards likely ones."""
 
     axes: ClassVar[Mapping[str, str]] = {}
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {
         "process": FeatureProcess,
         "shrinkage": Shrinkage,
     }

@@ -1,7 +1,7 @@
 """What a model file holds of a trained view of the shared models.
 
 An exact view is its latents and observations, from which the rest is made again; a sparse one its
-inducing latents and what they foretell, whatever number of frames it was learned from.
+inducing latents and what they predict, whatever number of frames it was learned from.
 """
 
 from __future__ import annotations

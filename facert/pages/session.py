@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, rms
 from facert.data.names import match
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.errors import InputError
-from facert.evaluation.metrics import rms
 from facert.io.take import write_take
 from facert.posing.pose import LEAST
 from facert.posing.suggestion import Suggestion, suggest_frames
@@ -49,7 +48,7 @@ class Session:
     controls : Controls
         The character's.
     take : Take, optional
-        What was recorded; its poses are the first labels, unless they were foretold by a model.
+        What was recorded; its poses are the first labels, unless they were predicted by a model.
     model : Retargeter, optional
         Tells a pose for every frame, and what poses the character makes.
     output : Path, optional
@@ -100,13 +99,13 @@ class Session:
         """A frame's label, else what the model says of it, with its standard deviation."""
         if self.labelled(frame) and self.take is not None and self.take.params is not None:
             return self.take.params[frame], None
-        return self._foretold(frame)
+        return self._predicted(frame)
 
     def labelled(self, frame: int) -> bool:
         """Whether a frame has a label."""
         return self.take is not None and frame in self.take.labels
 
-    def _foretold(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
+    def _predicted(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
         if self.result is None or self.result.params is None:
             return None, None
         std = self.result.std
@@ -197,7 +196,7 @@ def character_controls(model: Retargeter | None, take: Take | None, rig: Rig | N
 def _labels_only(take: Take, controls: Controls) -> Take:
     """The take with its labels and animation in the order of the controls.
 
-    Poses with a standard deviation were foretold: they are no labels.
+    Poses with a standard deviation were predicted: they are no labels.
     """
     if take.controls is None:
         return replace(take, controls=controls)

@@ -1,7 +1,7 @@
 """The pose to expect given some of its controls, and others that are plausible too.
 
-`facert.posing.regression` foretells the rest of the pose. How far it may be off is told by the
-known poses: each, left out, misses its own rest by a vector e_i. A plausible pose is the foretold
+`facert.posing.regression` predicts the rest of the pose. How far it may be off is told by the
+known poses: each, left out, misses its own rest by a vector e_i. A plausible pose is the predicted
 one plus the error of a known pose that has similar given controls,
 
     y = clip(f(g) + √(1 + 2 min d) e_i),      P(i) ~ exp(-γ d_i) + ε/n,      d_i = |g - g_i|/d̄,
@@ -78,8 +78,8 @@ class Completion:
         poses = known.poses
         rest = np.setdiff1d(np.arange(poses.shape[1]), given)
         regression = PoseRegression.learn(poses[:, given], poses[:, rest])
-        foretold = np.clip(poses[:, rest] - regression.errors, *known.bounds[rest].T)
-        return cls(known, given, rest, regression, poses[:, rest] - foretold)
+        predicted = np.clip(poses[:, rest] - regression.errors, *known.bounds[rest].T)
+        return cls(known, given, rest, regression, poses[:, rest] - predicted)
 
     def complete(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Poses whose given controls have these values exactly.

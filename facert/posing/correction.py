@@ -13,7 +13,7 @@ controls known, or known with variance s², the rest of the pose follows:
     y = p + E_:G (E_GG + s² I)⁻¹ (g - p_G).
 
 Controls that are held keep p, and tell the others nothing: known poses are few, and of many held
-controls E would foretell all others with certainty.
+controls E would predict all others with certainty.
 """
 
 from __future__ import annotations

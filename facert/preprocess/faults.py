@@ -11,7 +11,7 @@ spiked                a position off the line between the frames before and afte
                       where the rest of the face says that it should be
 ====================  ==========================================================================
 
-A fast motion, of the lids say, leaves the line too, but the markers around it foretell it; an odd
+A fast motion, of the lids say, leaves the line too, but the markers around it predict it; an odd
 pose surprises these, but lasts. A spike does both.
 """
 
@@ -41,7 +41,7 @@ ROUNDED = 3.0
 SMALL = 0.05
 """Spikes of less than this share of the largest standard deviation of a coordinate are let pass."""
 FEWEST = 4
-"""With fewer markers the rest of the face foretells too little to find a spike by."""
+"""With fewer markers the rest of the face predicts too little to find a spike by."""
 ROUNDS = 3
 """Large spikes widen the distribution that small ones are judged by: look again without them."""
 DISTANCES_AT_ONCE = 4_000_000
@@ -186,7 +186,7 @@ def exchanged(markers: FloatArray) -> BoolArray:
             pairs.append((first, second, rare))
     if not pairs:
         return suspect
-    expected = _foretold(np.where(suspect[:, :, None], np.nan, markers))
+    expected = _predicted(np.where(suspect[:, :, None], np.nan, markers))
     swapped = np.zeros_like(suspect)
     for first, second, rare in pairs:
         here, there = markers[rare][:, [first, second]], expected[rare][:, [first, second]]
@@ -198,7 +198,7 @@ def exchanged(markers: FloatArray) -> BoolArray:
 
 
 def single_spikes(markers: FloatArray) -> BoolArray:
-    """Positions that neither the frames around nor the markers around foretell, (T, M).
+    """Positions that neither the frames around nor the markers around predict, (T, M).
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def _fitted(X: FloatArray) -> Gaussian:
     return Gaussian.of(X if np.isnan(some).all(axis=0).any() else some)
 
 
-def _foretold(markers: FloatArray) -> FloatArray:
+def _predicted(markers: FloatArray) -> FloatArray:
     """The frames filled; a marker that was never seen stays NaN."""
     ever = ~np.isnan(markers[:, :, 0]).all(axis=0)
     X = markers[:, ever].reshape(len(markers), -1)
@@ -303,7 +303,7 @@ def _peaks(off: FloatArray) -> BoolArray:
 
 
 def _off_in_space(markers: FloatArray) -> FloatArray:
-    """How far each position is off what the rest of its frame foretells, (T, M)."""
+    """How far each position is off what the rest of its frame predicts, (T, M)."""
     frames, count = markers.shape[:2]
     X = markers.reshape(frames, -1)
     gaussian = _fitted(X)

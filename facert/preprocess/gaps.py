@@ -62,8 +62,8 @@ class Gaussian:
         return found
 
     @classmethod
-    def _of_complete(cls, X: FloatArray, doubt: FloatArray | float = 0.0) -> Gaussian:
-        covariance = np.atleast_2d(np.cov(X, rowvar=False, bias=True)) + doubt / len(X)
+    def _of_complete(cls, X: FloatArray, input_variance: FloatArray | float = 0.0) -> Gaussian:
+        covariance = np.atleast_2d(np.cov(X, rowvar=False, bias=True)) + input_variance / len(X)
         covariance[np.diag_indices_from(covariance)] += RIDGE * np.trace(covariance) / X.shape[1]
         return cls(X.mean(axis=0), covariance)
 

@@ -2,7 +2,7 @@
 
 Markers are parted by how they move (`facert.regions.bipartition`). Controls whose names speak of
 brows, eyes, mouth or jaw go to that region. Names that do not speak leave it to the labels: a
-control goes with the markers that foretell it best in labels left out. Nose and cheeks lie between,
+control goes with the markers that predict it best in labels left out. Nose and cheeks lie between,
 and so may what the labels do not clearly tell: such controls are learned from all markers. Weights,
 which have no place, go by their names where these speak, else by how they move as well.
 """
@@ -22,7 +22,7 @@ from facert.data.take import Take
 from facert.errors import InputError
 from facert.preprocess.gaps import fill_gaps
 from facert.regions.bipartition import two_groups
-from facert.regions.foretelling import left_out_errors
+from facert.regions.label_errors import left_out_errors
 
 log = logging.getLogger(__name__)
 
@@ -87,7 +87,7 @@ class Evidence:
         )
 
     def misses(self, group: BoolArray) -> FloatArray:
-        """The logarithm of how badly some markers foretell each control, (P,)."""
+        """The logarithm of how badly some markers predict each control, (P,)."""
         frames, labelled = (
             part[:, group].reshape(len(part), -1) for part in (self.frames, self.labelled)
         )
@@ -158,7 +158,7 @@ def _marker_sides(evidence: Evidence, named: FloatArray) -> FloatArray:
 def _is_upper(group: BoolArray, evidence: Evidence, named: FloatArray) -> bool:
     """Whether a group of markers is the upper one.
 
-    Controls whose names tell must be foretold by their own side, and the side whose controls move
+    Controls whose names tell must be predicted by their own side, and the side whose controls move
     more has the markers that do. Where names do not tell, the calmer group is: nothing moves as a
     jaw does.
     """
@@ -180,7 +180,7 @@ def _log_ratio(one: float, other: float) -> float:
 
 
 def _control_sides(evidence: Evidence, named: FloatArray, markers: FloatArray) -> FloatArray:
-    """The side of each control: by its name, else by the markers that foretell it best."""
+    """The side of each control: by its name, else by the markers that predict it best."""
     sides = named
     if np.isnan(named).any():
         closer = evidence.misses(markers < 0) - evidence.misses(markers > 0)

@@ -11,11 +11,10 @@ from facert.data.normalisation import Normalisation
 from facert.data.regions import Region, Regions
 from facert.data.take import Controls, Source
 from facert.errors import InputError
-from facert.methods import make_method
 from facert.methods.base import Method
 from facert.methods.noise import with_noise
-from facert.regions.foretelling import left_out_errors
-from facert.regions.regional import Layout, Regional
+from facert.regions.label_errors import left_out_errors
+from facert.regions.regional import Layout, untrained_method
 from facert.settings import Settings
 
 FAULTLESS = 1e-9  # least error of a region, relative to the variance of the control
@@ -58,15 +57,15 @@ def method_for(settings: Settings, given: Settings, face: FaceData) -> Method:
     InputError
         When there is none of that name, or nothing moves in a region.
     """
-    if isinstance(settings.regions, Regions):
-        return Regional(settings, lay_out(settings.regions, face, given))
-    return make_method(settings)
+    regions = settings.regions
+    layout = lay_out(regions, face, given) if isinstance(regions, Regions) else None
+    return untrained_method(settings, layout)
 
 
 def lay_out(regions: Regions, face: FaceData, settings: Settings) -> Layout:
     """The layout of regions.
 
-    Those that share a control have a weight in it by how well their markers foretell it: the
+    Those that share a control have a weight in it by how well their markers predict it: the
     inverse of the mean squared error at labels left out.
 
     Parameters
@@ -107,7 +106,7 @@ def lay_out(regions: Regions, face: FaceData, settings: Settings) -> Layout:
 
 
 def _errors(face: FaceData, seen: BoolArray) -> FloatArray:
-    """How badly some columns foretell each control, (P,); above 0."""
+    """How badly some columns predict each control, (P,); above 0."""
     frames, labelled = (X.compress(seen, axis=1) for X in (face.complete, face.labelled))
     found = left_out_errors(frames, labelled, face.poses[: len(labelled)])
     return np.maximum(found, FAULTLESS)

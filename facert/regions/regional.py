@@ -21,12 +21,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, Arrays
+from facert.data.array_group import DAMAGED, ArrayGroup
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import MOST
 from facert.errors import InputError
-from facert.methods import make_method
 from facert.methods.base import (
     IN_TARGET_UNITS,
     Labelled,
@@ -36,6 +35,7 @@ from facert.methods.base import (
     Stream,
     Unlabelled,
 )
+from facert.methods.registry import make_method
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
@@ -43,7 +43,7 @@ WHOLE = 1e-9  # by which the weights of a control may miss 1
 
 
 @dataclass(frozen=True, eq=False)
-class Layout(Arrays):
+class Layout(ArrayGroup):
     """What each of r regions sees and moves, in columns of normalised arrays.
 
     Parameters
@@ -100,12 +100,12 @@ class _Part:
         return Unlabelled(self._frames(whole.X), self._poses(whole.Y), bounds)
 
     def observed(
-        self, X: FloatArray, doubt: FloatArray | None
+        self, X: FloatArray, input_variance: FloatArray | None
     ) -> tuple[FloatArray, FloatArray | None]:
         """Frames and the variance of what was filled in, in the region's units."""
-        if doubt is None:
+        if input_variance is None:
             return self._frames(X), None
-        return self._frames(X), doubt.take(self.columns, axis=1) / self.source_unit**2
+        return self._frames(X), input_variance.take(self.columns, axis=1) / self.source_unit**2
 
     def figures(self, report: Report) -> dict[str, float]:
         """Of the region's report, in the units of the face."""
@@ -191,9 +191,9 @@ class Regional:
             told.append(part.figures(report))
         return Report(figures=_together(self._names, told))
 
-    def predict(self, frames: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
-        said = [part.method.predict(*part.observed(frames, doubt)) for part in self.parts_]
+        said = [part.method.predict(*part.observed(frames, input_variance)) for part in self.parts_]
         return self._blend(said, frames)
 
     def on(self, device: str) -> Self:
@@ -273,6 +273,16 @@ class Regional:
         return Prediction(poses, np.sqrt(variances) if tells_std else None, source)
 
 
+def untrained_method(settings: Settings, layout: Layout | None = None) -> Method:
+    """The method of the settings; with regions, one that has it for each of them.
+
+    Without a layout, a regional method is ready for `Method.load` alone.
+    """
+    if settings.regions is not None:
+        return Regional(settings, layout)
+    return make_method(settings)
+
+
 def _of_region(face: Normalisation, columns: IntArray, old: float, new: float) -> Normalisation:
     """Units of a region in those that it had, from the face's and the region's own in both."""
     return Normalisation(face.mean[columns] / old, face.scale * new / old)
@@ -283,10 +293,10 @@ class _RegionalStream:
         self.method = method
         self.streams = [part.method.stream() for part in method.parts_]
 
-    def step(self, frame: FloatArray, doubt: FloatArray | None = None) -> Prediction:
+    def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
         parts = zip(self.streams, self.method.parts_, strict=True)
-        said = [stream.step(*part.observed(frame, doubt)) for stream, part in parts]
+        said = [stream.step(*part.observed(frame, input_variance)) for stream, part in parts]
         return self.method._blend(said, frame)
 
 

@@ -14,7 +14,7 @@ from facert.data.take import Take
 from facert.preprocess.motion.estimate import estimate
 
 if TYPE_CHECKING:
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
 log = logging.getLogger(__name__)
@@ -70,7 +70,7 @@ def clean(take: Take, sigma: float | None = None) -> Cleaned:
 
 
 def clean_with_model(
-    take: Take, retargeter: Retargeter, handling: Handling | None = None
+    take: Take, retargeter: Retargeter, options: RetargetOptions | None = None
 ) -> Cleaned:
     """Fill gaps and remove noise by a trained model, which knows the actor from its training take.
 
@@ -84,7 +84,7 @@ def clean_with_model(
     if not retargeter.method.stepwise:
         name = retargeter.settings.method
         log.warning("%s cleans by the take alone; shared models clean by what they learned", name)
-    found = retargeter.retarget(take, handling=handling).source
+    found = retargeter.retarget(take, options=options).source
     index = NameIndex(take.source.names)
     places = [index.find(name) for name in found.names]
     shown = np.zeros(found.valid.shape, dtype=np.bool_)

@@ -7,6 +7,7 @@ import logging
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.labelling import predicted_poses
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError
@@ -25,31 +26,26 @@ MOST_FRAMES = 100
 
 
 def check_poses(take: Take) -> None:
-    """Tell poses that a model foretold, and so have a standard deviation, from labels.
+    """Tell poses that a model predicted, and so have a standard deviation, from labels.
 
     Raises
     ------
     InputError
-        When all of them are foretold: a result of retargeting was taken for what it was learned
+        When all of them are predicted: a result of retargeting was taken for what it was learned
         from. Of some the log warns.
     """
-    foretold = foretold_poses(take)
-    if foretold and foretold == len(take.labels):
+    predicted = predicted_poses(take)
+    if predicted and predicted == len(take.labels):
         raise InputError(
             "/target/std",
             "poses that somebody set",
-            f"a standard deviation for all {foretold}: a model foretold them",
-            "Give the take that was posed; --foretold (in Python a take with std=None) learns "
-            "from these nonetheless.",
+            f"a standard deviation for all {predicted}: a model predicted them",
+            "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
+            "learns from these nonetheless.",
         )
-    if foretold:
-        poses = plural(foretold, "pose")
-        log.warning("%s with a standard deviation: foretold, and learned from as labels", poses)
-
-
-def foretold_poses(take: Take) -> int:
-    """How many of the posed frames have a standard deviation: a model foretold them."""
-    return 0 if take.std is None else int((take.std[take.labels] > 0).any(axis=1).sum())
+    if predicted:
+        poses = plural(predicted, "pose")
+        log.warning("%s with a standard deviation: predicted, and learned from as labels", poses)
 
 
 def warn_if_constant(method: Method, frames: FloatArray, labels: FloatArray) -> None:

@@ -16,9 +16,9 @@ from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, SourceKind
 from facert.errors import InputError, reading
 from facert.io.tensors import read_tensors, write_tensors
-from facert.methods import make_method
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
+from facert.regions.regional import untrained_method
 from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
@@ -86,7 +86,7 @@ def load(path: str | Path) -> Retargeter:
             raise InputError(
                 "the metadata", "a complete model", f"{error!r}", "Train the model again."
             ) from None
-        method = make_method(settings)
+        method = untrained_method(settings)
         method.load(
             {n.removeprefix("method."): a for n, a in arrays.items() if n.startswith("method.")}
         )

@@ -11,7 +11,7 @@ from facert.retarget.adjustments import Adjustments
 
 
 @dataclass(frozen=True)
-class Handling:
+class RetargetOptions:
     """What a person may choose for each take, whatever the model.
 
     Parameters
@@ -40,5 +40,5 @@ class Handling:
             raise InputError("sigma", "a number from 0", repr(self.sigma), "Change it.")
 
 
-AS_IT_IS = Handling(detect=False, smooth=False)
+AS_IT_IS = RetargetOptions(detect=False, smooth=False)
 """Every frame on its own, and every number believed."""

@@ -27,7 +27,7 @@ from facert.preprocess.neutral import at_rest, calibrated
 from facert.preprocess.source_layout import SourceLayout
 from facert.retarget.adjustments import Adjustments
 from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
-from facert.retarget.options import Handling
+from facert.retarget.options import RetargetOptions
 from facert.retarget.stream import ABSURD, RetargetStream
 from facert.settings import Settings
 
@@ -87,7 +87,7 @@ class Retargeter:
         self,
         take: Take,
         mode: Mode = "offline",
-        handling: Handling | None = None,
+        options: RetargetOptions | None = None,
         device: str = "cpu",
     ) -> Take:
         """The take with a pose in every frame, and a cleaned source.
@@ -102,7 +102,7 @@ class Retargeter:
         mode : {"offline", "online"}
             All frames at once, cleaned by what those before and after tell; or one after the
             other, as a live stream would be.
-        handling : Handling, optional
+        options : RetargetOptions, optional
             What is done about bad markers, noise, the actor's rest and single controls.
         device : str
             Where the shared models map all frames at once: ``"cpu"`` or ``"cuda"``. One after the
@@ -115,13 +115,13 @@ class Retargeter:
         InputError
             When the source is of another kind or lacks names that the model needs.
         """
-        handling = handling or Handling()
+        options = options or RetargetOptions()
         if mode not in get_args(Mode):
             raise InputError("mode", "offline or online", repr(mode), "Choose one of these.")
         if self.units and take.units and self.units != take.units:
             raise InputError("units", self.units, take.units, "Convert the take to these units.")
         self.layout.require_kind(take.source.kind)
-        if handling.neutral is not None and self.settings.neutral is None:
+        if options.neutral is not None and self.settings.neutral is None:
             log.warning(
                 "the model does not know the actor at rest and takes the smallest pose for it: "
                 "name such frames in training as well"
@@ -129,8 +129,8 @@ class Retargeter:
         there = replace(self, method=self.method.on(device))
         try:
             if mode == "online":
-                return self._one_by_one(take, handling)
-            return there._together(take, handling)
+                return self._one_by_one(take, options)
+            return there._together(take, options)
         except (np.linalg.LinAlgError, OverflowError):
             raise NumericalError("the model's numbers are too large or small to map with") from None
 
@@ -138,11 +138,11 @@ class Retargeter:
         self,
         names: Sequence[str],
         fps: float | None = None,
-        handling: Handling | None = None,
+        options: RetargetOptions | None = None,
         rest: FloatArray | None = None,
     ) -> RetargetStream:
         """Begin to retarget a live source; see `RetargetStream`."""
-        return RetargetStream(self, names, fps, handling, rest)
+        return RetargetStream(self, names, fps, options, rest)
 
     def finished(
         self, Y: FloatArray, std: FloatArray | None, adjustments: Adjustments
@@ -205,29 +205,29 @@ class Retargeter:
 
         save(self, Path(path), overwrite)
 
-    def _together(self, take: Take, handling: Handling) -> Take:
+    def _together(self, take: Take, options: RetargetOptions) -> Take:
         """All frames at once: smoothed over time, then mapped in one batch."""
-        observed = without_faults(take) if handling.detect else take
+        observed = without_faults(take) if options.detect else take
         source = self.layout.arrange(observed.source)
         X = source.matrix
-        if handling.neutral is not None:
-            rest = at_rest(X, np.asarray(handling.neutral, dtype=np.int64))
+        if options.neutral is not None:
+            rest = at_rest(X, np.asarray(options.neutral, dtype=np.int64))
             X = calibrated(X, rest, self.neutral, self.layout.kind)
         measured = self.source_units.apply(X)
         _check_distance(measured)
         smoothed = None
-        if handling.smooth:
-            smoothed = estimate_if_it_moves(X, take.time, handling.sigma)
-        adjust = handling.adjustments or Adjustments.none(len(self.controls.names))
+        if options.smooth:
+            smoothed = estimate_if_it_moves(X, take.time, options.sigma)
+        adjust = options.adjustments or Adjustments.none(len(self.controls.names))
         if smoothed is None:
             said, std_x = self.method.predict(measured), None
         else:
             log.info("%s", smoothed.told(take.units))
             clean, std_x = self.source_units.apply(smoothed.frames), smoothed.std
-            doubt = np.where(np.isnan(X), smoothed.std / self.source_units.scale, 0.0) ** 2
-            said = self.method.predict(clean, doubt)
+            input_variance = np.where(np.isnan(X), smoothed.std / self.source_units.scale, 0.0) ** 2
+            said = self.method.predict(clean, input_variance)
             if not adjust.smooth_all:
-                rough = self.method.predict(np.where(np.isnan(X), clean, measured), doubt)
+                rough = self.method.predict(np.where(np.isnan(X), clean, measured), input_variance)
                 said = replace(said, Y=adjust.mixed(said.Y, rough.Y))
         if len(said.X) >= FEWEST:  # of single frames there is nothing to tell in shares
             self._tell_what_is_new(said.X)
@@ -235,18 +235,18 @@ class Retargeter:
         cleaned = source.with_matrix(self.source_units.undo(said.X), std_x)
         return self._performance(take, cleaned, params, std)
 
-    def _one_by_one(self, take: Take, handling: Handling) -> Take:
+    def _one_by_one(self, take: Take, options: RetargetOptions) -> Take:
         """One frame after the other, as they would come live."""
         values, rest = take.source.values, None
-        observed = without_faults(take).source if handling.detect else take.source
+        observed = without_faults(take).source if options.detect else take.source
         X = self.layout.arrange(observed).matrix
-        if handling.neutral is not None:
-            frames = np.asarray(handling.neutral, dtype=np.int64)
+        if options.neutral is not None:
+            frames = np.asarray(options.neutral, dtype=np.int64)
             rest = at_rest(observed.matrix, frames).reshape(values.shape[1:])
             own = at_rest(X, frames)
             X = calibrated(X, own, self.neutral, self.layout.kind)
         _check_distance(self.source_units.apply(X))
-        stream = self.stream(take.source.names, 1.0 / grid(take.time)[1], handling, rest)
+        stream = self.stream(take.source.names, 1.0 / grid(take.time)[1], options, rest)
         with threads_for(1):
             steps = [stream.step(frame).complete() for frame in values]
         stds = [step.std for step in steps if step.std is not None]

@@ -17,7 +17,7 @@ from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import FramePicker
 from facert.retarget.adjustments import Adjustments
-from facert.retarget.options import Handling
+from facert.retarget.options import RetargetOptions
 
 if TYPE_CHECKING:
     from facert.retarget.retargeter import Retargeter
@@ -75,7 +75,7 @@ class RetargetStream:
         Of the source's markers or weights.
     fps : float, optional
         Frames a second; by default that of the training take.
-    handling : Handling, optional
+    options : RetargetOptions, optional
         Its neutral frames are not used: see `rest`.
     rest : array, shape of a frame, optional
         The source with the actor at rest.
@@ -91,10 +91,10 @@ class RetargetStream:
         retargeter: Retargeter,
         names: Sequence[str],
         fps: float | None = None,
-        handling: Handling | None = None,
+        options: RetargetOptions | None = None,
         rest: FloatArray | None = None,
     ) -> None:
-        handling = handling or Handling()
+        options = options or RetargetOptions()
         if fps is not None and not 0.0 < fps < np.inf:
             raise InputError("fps", "a number above 0", repr(fps), "Give the true rate.")
         places = retargeter.layout.places(names)
@@ -103,14 +103,14 @@ class RetargetStream:
         self._shape = (len(names), 3) if markers else (len(names),)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
         self._picker = FramePicker(places, len(names), 3 if markers else 1)
-        self._watch = MarkerWatch(len(names)) if handling.detect and markers else None
-        self._new_filter = partial(_filter, retargeter, fps, handling)
+        self._watch = MarkerWatch(len(names)) if options.detect and markers else None
+        self._new_filter = partial(_filter, retargeter, fps, options)
         self._filter = self._new_filter()
         self._heard: float | None = None
-        given = self._filter is None or handling.sigma is not None
+        given = self._filter is None or options.sigma is not None
         self._meter = None if given else NoiseMeter(len(retargeter.source_units.mean))
         self._unheard: FloatArray | None = None
-        self._adjustments = handling.adjustments or Adjustments.none(len(retargeter.controls.names))
+        self._adjustments = options.adjustments or Adjustments.none(len(retargeter.controls.names))
         self._finish = _Finish(retargeter, self._adjustments)
         self._smooth = retargeter.method.stream()
         self._rough = None if self._adjustments.smooth_all else retargeter.method.stream()
@@ -165,12 +165,12 @@ class RetargetStream:
         if (np.abs(frame) > ABSURD).any():  # never where NaN
             expected, found = "positions near those of the training take", "others, far away"
             raise InputError("the frame", expected, found, "Skip it; check units and origin.")
-        clean, doubt = self._cleaned(frame, seen)
-        said = self._smooth.step(clean[None], doubt)
+        clean, input_variance = self._cleaned(frame, seen)
+        said = self._smooth.step(clean[None], input_variance)
         Y = said.Y
         if self._rough is not None:
             measured = frame if seen is None else np.where(seen, frame, clean)
-            Y = self._adjustments.mixed(Y, self._rough.step(measured[None], doubt).Y)
+            Y = self._adjustments.mixed(Y, self._rough.step(measured[None], input_variance).Y)
         return Streamed(self._finish.params(Y[0]), lambda: self._told(said))
 
     def _checked(self, values: FloatArray) -> FloatArray:
@@ -234,12 +234,14 @@ class _Finish:
         return None if std is None else np.asarray(std[0] * self._spread)
 
 
-def _filter(retargeter: Retargeter, fps: float | None, handling: Handling) -> MotionFilter | None:
+def _filter(
+    retargeter: Retargeter, fps: float | None, options: RetargetOptions
+) -> MotionFilter | None:
     """What takes noise out, if it is wanted and the model knows how its source moves."""
     motion = retargeter.motion
-    if motion is None or not handling.smooth:
+    if motion is None or not options.smooth:
         return None
     sigma = motion.sigma
-    if handling.sigma is not None:
-        sigma = handling.sigma / retargeter.source_units.scale
+    if options.sigma is not None:
+        sigma = options.sigma / retargeter.source_units.scale
     return MotionFilter(motion if fps is None else motion.every(1.0 / fps), sigma)

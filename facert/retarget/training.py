@@ -14,9 +14,9 @@ from facert.data.normalisation import Normalisation
 from facert.data.ranges import parse_frames
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.methods import method_class
 from facert.methods.base import IN_TARGET_UNITS, Labelled, Method, Report, Unlabelled
 from facert.methods.noise import with_noise
+from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.known_poses import keep
 from facert.preprocess.neutral import at_rest, most_neutral

@@ -5,7 +5,7 @@ import pytest
 from facert.data.ranges import default_step, parse_range
 from facert.errors import InputError
 from facert.io.take import write_take
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 
 
 @pytest.fixture

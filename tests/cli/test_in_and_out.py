@@ -70,14 +70,14 @@ def test_a_model_that_is_not_there_gets_its_option_named(facert, table: Path) ->
     assert "-m" in refused.err
 
 
-def test_poses_that_a_model_foretold_are_no_labels(facert, make_take, tmp_path: Path) -> None:
+def test_poses_that_a_model_predicted_are_no_labels(facert, make_take, tmp_path: Path) -> None:
     take, result = tmp_path / "take.h5", tmp_path / "result.h5"
     posed = make_take(frames=20, posed=20, animation=0)
     package.write_take(posed, take)
     package.write_take(replace(posed, std=np.full((20, 4), 0.1)), result)
     refused = facert("convert", take, tmp_path / "out.h5", "--poses", result)
     assert refused.code == 3
-    assert "a model foretold them" in refused.err
+    assert "a model predicted them" in refused.err
     table = tmp_path / "result.csv"
     assert facert("convert", result, table).code == 0  # the way out that the message tells
     assert facert("convert", take, tmp_path / "out.h5", "--poses", table).code == 0

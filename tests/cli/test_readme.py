@@ -68,7 +68,7 @@ def test_settings_table_shows_the_defaults():
 
 
 def test_every_method_is_in_the_table():
-    from facert.methods import REGISTRY
+    from facert.methods.registry import REGISTRY
 
     table = README.split("| method | what it learns")[1].split("\n\n")[0]
     assert re.findall(r"^\| `([\w-]+)` \|", table, re.MULTILINE) == list(REGISTRY)

@@ -38,11 +38,11 @@ def test_settings_that_are_used_need_no_word(facert, take: Path) -> None:
     assert "does not use" not in facert("train", take, "-o", model, "--overwrite").err
 
 
-def test_poses_that_a_model_foretold_are_learned_from_when_asked(facert, make_take, take) -> None:
+def test_poses_that_a_model_predicted_are_learned_from_when_asked(facert, make_take, take) -> None:
     posed = make_take(posed=60)
     result = replace(posed, std=np.full_like(posed.params, 0.1))
     package.write_take(result, take, overwrite=True)
     model = take.with_name("a.safetensors")
-    done = facert("train", take, "-o", model, "--method", "ridge", "--foretold")
+    done = facert("train", take, "-o", model, "--method", "ridge", "--allow-predicted")
     assert done.code == 0
     assert "deviation" not in done.err

@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from facert.data.arrays import rms
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
-from facert.evaluation.metrics import compare, jitter, rms, score, vertex_errors, vertex_gram
+from facert.evaluation.metrics import compare, jitter, score, vertex_errors, vertex_gram
 
 NAMES = ("jawOpen", "browDown_L", "browDown_R")
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import facert
+from facert.data.arrays import rms
 from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.evaluation.cells import Cell, Outcome, cell_settings, evaluate
-from facert.evaluation.metrics import rms
 from facert.evaluation.protocol import (
     Protocol,
     draw,
@@ -22,7 +22,7 @@ from facert.evaluation.protocol import (
 )
 from facert.evaluation.run import Grid, fingerprint, run
 from facert.io.journal import Journal
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 from facert.retarget.options import AS_IT_IS
 
 GRID = Grid(methods=("nearest", "ridge"), labels=(4, 6), unlabelled=(10,), repeats=2)
@@ -38,7 +38,7 @@ def test_a_cell_equals_a_direct_computation(make, quick):
     retargeter = facert.train(
         training_take(problem, chosen, 1), cell_settings(problem, cell, quick)
     )
-    result = retargeter.retarget(held_out_take(problem, chosen, 1), handling=AS_IT_IS)
+    result = retargeter.retarget(held_out_take(problem, chosen, 1), options=AS_IT_IS)
     outcome = evaluate(problem, cell, quick)
     assert outcome.scores.rms == rms(result.params - true_poses(problem, chosen))
     assert outcome.fit_seconds > 0

@@ -7,7 +7,7 @@ from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
 from facert.evaluation.summary import summarise
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 
 CASE = Case("rom", "arkit")
 

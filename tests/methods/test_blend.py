@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from facert.evaluation.metrics import rms
-from facert.methods import make_method
+from facert.data.arrays import rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.blend import MOST_POSES, TOGETHER, Auto, _fewer_poses, blend_weights
+from facert.methods.registry import make_method
 from facert.settings import Settings
 
 

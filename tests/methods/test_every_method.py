@@ -8,10 +8,10 @@ import torch
 
 import facert
 from facert import Controls, InputError, Settings, Source
+from facert.data.arrays import rms
 from facert.errors import DeviceError
-from facert.evaluation.metrics import rms
-from facert.methods import REGISTRY, make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.methods.registry import REGISTRY, make_method
 from facert.retarget.options import AS_IT_IS
 
 every_method = pytest.mark.parametrize("name", REGISTRY)
@@ -94,8 +94,8 @@ def test_a_saved_and_loaded_retargeter_predicts_the_same(name, trained, take, tm
 def test_permuting_frames_permutes_the_answer(name, trained, take):
     order = np.random.default_rng(0).permutation(len(take))
     permuted = replace(take, source=replace(take.source, values=take.source.values[order]))
-    result = trained(name).retarget(permuted, handling=AS_IT_IS)
-    expected = trained(name).retarget(take, handling=AS_IT_IS)
+    result = trained(name).retarget(permuted, options=AS_IT_IS)
+    expected = trained(name).retarget(take, options=AS_IT_IS)
     np.testing.assert_allclose(result.params, expected.params[order], atol=1e-7)
 
 
@@ -154,7 +154,7 @@ def test_a_frame_without_any_marker_gets_a_pose(name, trained, take):
 @every_method
 def test_frame_by_frame_a_stream_gives_what_the_method_gives(name, trained, take):
     online = trained(name).retarget(take, "online", AS_IT_IS)
-    offline = trained(name).retarget(take, handling=AS_IT_IS)
+    offline = trained(name).retarget(take, options=AS_IT_IS)
     np.testing.assert_allclose(online.params[0], offline.params[0], atol=1e-10)
     assert (online.std is None) == (offline.std is None)
 

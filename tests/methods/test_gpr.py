@@ -4,9 +4,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
 
 from facert.errors import InputError
-from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.gpr import ProcessMap
+from facert.methods.registry import make_method
 from facert.settings import Settings
 
 

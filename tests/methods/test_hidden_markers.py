@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from facert.evaluation.metrics import rms
-from facert.methods import REGISTRY, make_method, method_class
+from facert.data.arrays import rms
 from facert.methods.base import Labelled, Unlabelled
+from facert.methods.registry import REGISTRY, make_method, method_class
 from facert.settings import Settings
 
 # Every regression that tells a standard deviation.

@@ -9,9 +9,9 @@ import pytest
 
 import facert
 from facert.data.normalisation import Normalisation
-from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.one_frame import BlendFrame, FactorFrame, ProcessBank
+from facert.methods.registry import make_method
 from facert.settings import Settings
 
 EXACT = 1e-10

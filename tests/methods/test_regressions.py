@@ -6,13 +6,13 @@ from scipy.interpolate import RBFInterpolator
 from sklearn.cross_decomposition import PLSRegression
 from sklearn.svm import SVR as ScikitSVR
 
+from facert.data.arrays import rms
 from facert.errors import InputError
-from facert.evaluation.metrics import rms
-from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import blocked_folds
 from facert.methods.interpolation import SMOOTHING
 from facert.methods.linear import _poses_by_components, leave_one_out_ridge
+from facert.methods.registry import make_method
 from facert.methods.svr import PackedMap
 from facert.settings import Settings
 

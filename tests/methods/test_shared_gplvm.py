@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from facert.data.arrays import rms
 from facert.errors import InputError
-from facert.evaluation.metrics import rms
-from facert.methods import make_method
 from facert.methods.base import Labelled, Unlabelled
+from facert.methods.registry import make_method
 from facert.models.gplvm import staging
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
@@ -53,7 +53,7 @@ def test_the_supervised_model_does_not_look_at_unlabelled_data():
 
 
 @pytest.mark.parametrize("likelihood", ["vfe", "fitc"])
-def test_through_inducing_latents_the_model_foretells_nearly_the_same(method, likelihood):
+def test_through_inducing_latents_the_model_predicts_nearly_the_same(method, likelihood):
     sparse = fitted(likelihood=likelihood, inducing=20)
     frames = make_data()[1].X
     exact, other = method.predict(frames), sparse.predict(frames)

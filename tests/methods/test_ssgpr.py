@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.ssgpr import SemiSupervisedGPR
 from facert.settings import Settings

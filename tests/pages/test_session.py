@@ -72,7 +72,7 @@ def test_what_the_first_model_knew_of_poses_is_not_lost(make_take, tmp_path) -> 
     assert len(session.model.poses) == len(model.poses) + 3
 
 
-def test_foretold_poses_are_no_labels(make_take) -> None:
+def test_predicted_poses_are_no_labels(make_take) -> None:
     take = make_take()
     model = facert.train(take, facert.Settings(method="gpr"))
     session = Session(model.controls, model.retarget(take), model)

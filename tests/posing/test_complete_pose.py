@@ -7,7 +7,7 @@ import pytest
 
 import facert
 from facert import Controls, InputError, Settings
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 
 NAMES = ["jawOpen", "mouthSmile_L", "browInnerUp", "cheekPuff"]
 QUICK = {"latent_dim": 3, "neighbours": 5, "max_iterations": 5, "unlabelled": 30}

@@ -6,7 +6,7 @@ from hypothesis import given as for_all
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 from facert.posing import regression
 from facert.posing.completion import Completion
 from facert.posing.regression import PoseRegression

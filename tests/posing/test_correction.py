@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 from facert.posing.correction import correct
 from facert.preprocess.known_poses import Given, KnownPoses
 

@@ -148,7 +148,7 @@ def test_regions_keep_the_brows_still_when_only_the_mouth_moves():
 
     def moved(regions):
         settings = Settings(method="ridge", regions=regions, smooth=False, detect=False)
-        result = train(take, settings).retarget(alone, handling=AS_IT_IS)
+        result = train(take, settings).retarget(alone, options=AS_IT_IS)
         return np.ptp(result.params[:, :3], axis=0).max()
 
     assert moved("auto") < 1e-9

@@ -8,7 +8,7 @@ import pytest
 import facert
 from facert import InputError, Settings
 from facert.data.regions import Region, Regions
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 from facert.regions.regional import Layout, Regional
 from facert.retarget.options import AS_IT_IS
 
@@ -134,7 +134,7 @@ def test_a_shared_control_is_the_weighted_mean_of_its_regions(take):
     np.testing.assert_allclose(said[0], (said[1] + said[2]) / 2.0, atol=1e-12)
 
 
-def test_the_region_that_foretells_a_shared_control_weighs_more(take):
+def test_the_region_that_predicts_a_shared_control_weighs_more(take):
     """Where the lower markers are noise, the upper ones are believed."""
     rng = np.random.default_rng(0)
     values = take.source.values.copy()

@@ -10,8 +10,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 import facert
 from facert import Controls, InputError, Settings, Source
+from facert.data.arrays import rms
 from facert.data.normalisation import Normalisation
-from facert.evaluation.metrics import rms
 from facert.preprocess.training_set import choose_training_set
 from facert.retarget.options import AS_IT_IS
 
@@ -102,10 +102,10 @@ def test_neither_unit_nor_origin_of_the_source_matters(retargeter, take, scale, 
 
 def test_as_it_is_every_frame_is_mapped_on_its_own(retargeter, take):
     order = np.random.default_rng(0).permutation(len(take))
-    expected = retargeter.retarget(take, handling=AS_IT_IS)
-    permuted = retargeter.retarget(only(take, order), handling=AS_IT_IS)
+    expected = retargeter.retarget(take, options=AS_IT_IS)
+    permuted = retargeter.retarget(only(take, order), options=AS_IT_IS)
     np.testing.assert_allclose(permuted.params, expected.params[order], atol=1e-7)
-    few = retargeter.retarget(only(take, order[:5]), handling=AS_IT_IS)
+    few = retargeter.retarget(only(take, order[:5]), options=AS_IT_IS)
     np.testing.assert_allclose(few.params, expected.params[order[:5]], atol=1e-7)
 
 
@@ -119,7 +119,7 @@ def test_without_temporal_pull_online_is_offline(shared, take):
     free = deepcopy(shared)
     free.method.settings = replace(free.settings, sigma_t=1e6)
     online = free.retarget(take, "online", AS_IT_IS)
-    offline = shared.retarget(take, handling=AS_IT_IS)
+    offline = shared.retarget(take, options=AS_IT_IS)
     same = np.abs(online.params - offline.params).max(axis=1) < 1e-5
     assert same.mean() > 0.95  # one or the other finds a better optimum from where the last was
 

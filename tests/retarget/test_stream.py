@@ -9,7 +9,7 @@ import facert
 from facert import InputError, Settings, Source
 from facert.preprocess.motion.filtering import HEARD
 from facert.retarget.adjustments import Adjustments
-from facert.retarget.options import AS_IT_IS, Handling
+from facert.retarget.options import AS_IT_IS, RetargetOptions
 from facert.retarget.stream import _Finish
 
 
@@ -63,7 +63,7 @@ def test_markers_may_come_in_any_order_and_some_not_at_all(retargeter, noisy):
 
 def test_neighbouring_frames_take_out_noise_offline_most(retargeter, noisy, truth):
     results = {
-        "as it is": retargeter.retarget(noisy, handling=AS_IT_IS),
+        "as it is": retargeter.retarget(noisy, options=AS_IT_IS),
         "online": retargeter.retarget(noisy, "online"),
         "offline": retargeter.retarget(noisy),
     }
@@ -85,7 +85,7 @@ def test_bad_markers_are_hidden_before_anything_is_mapped(retargeter, noisy, cap
         one, other = retargeter.retarget(bad, mode), retargeter.retarget(hidden, mode)
         np.testing.assert_allclose(one.params, other.params, atol=1e-10)
         assert "20 zero" in caplog.text or mode == "online"
-        believed = retargeter.retarget(bad, mode, Handling(detect=False))
+        believed = retargeter.retarget(bad, mode, RetargetOptions(detect=False))
         assert np.abs(believed.params - other.params)[40:60].max() > 0.05
 
 
@@ -94,11 +94,11 @@ def test_gain_limits_and_smoothing_are_those_of_each_control(retargeter, noisy, 
     tables = {"jaw": {"gain": 2.0, "limits": [-0.1, 0.1]}, "smile": {"smoothing": 0.0}}
     adjustments = Adjustments.of(tables, noisy.controls.names)
     plain = retargeter.retarget(noisy, mode)
-    result = retargeter.retarget(noisy, mode, Handling(adjustments=adjustments))
+    result = retargeter.retarget(noisy, mode, RetargetOptions(adjustments=adjustments))
     np.testing.assert_allclose(result.params[:, 0], np.clip(2.0 * plain.params[:, 0], -0.1, 0.1))
     np.testing.assert_allclose(result.std[:, 0], 2.0 * plain.std[:, 0])
     np.testing.assert_allclose(result.params[:, 2:], plain.params[:, 2:])
-    measured = retargeter.retarget(noisy, handling=AS_IT_IS)
+    measured = retargeter.retarget(noisy, options=AS_IT_IS)
     np.testing.assert_allclose(result.params[:, 1], measured.params[:, 1], atol=1e-8)
 
 
@@ -109,7 +109,7 @@ def test_markers_stuck_on_anew_are_made_up_for_by_the_actor_at_rest(noisy, mode)
     moved = replace(noisy, source=Source(noisy.source.values + shift, noisy.source.names))
     expected = retargeter.retarget(noisy, mode)
     off = retargeter.retarget(moved, mode)
-    calibrated = retargeter.retarget(moved, mode, Handling(neutral=range(11)))
+    calibrated = retargeter.retarget(moved, mode, RetargetOptions(neutral=range(11)))
     assert rms(off.params - expected.params) > 0.1
     assert rms(calibrated.params - expected.params) < 0.01
 
@@ -125,8 +125,8 @@ def test_a_filled_gap_widens_the_std(retargeter, noisy):
 
 def test_a_given_noise_is_believed(retargeter, noisy):
     for mode in ("offline", "online"):
-        exact = retargeter.retarget(noisy, mode, Handling(sigma=0.0)).params
-        rough = retargeter.retarget(noisy, mode, Handling(sigma=1.0)).params
+        exact = retargeter.retarget(noisy, mode, RetargetOptions(sigma=0.0)).params
+        rough = retargeter.retarget(noisy, mode, RetargetOptions(sigma=1.0)).params
         assert jitter(rough) < jitter(exact)
 
 
@@ -140,7 +140,7 @@ def test_a_model_of_scattered_frames_streams_them_as_they_come(make_take):
     assert retargeter.motion is None
     online = retargeter.retarget(take, "online")
     np.testing.assert_allclose(
-        online.params, retargeter.retarget(take, handling=AS_IT_IS).params, atol=1e-10
+        online.params, retargeter.retarget(take, options=AS_IT_IS).params, atol=1e-10
     )
 
 
@@ -174,7 +174,7 @@ def test_frames_at_rest_must_be_there(noisy, retargeter):
     with pytest.raises(InputError, match="neutral"):
         facert.train(noisy, Settings(method="ridge", neutral="500"))
     with pytest.raises(InputError, match="neutral"):
-        retargeter.retarget(noisy, handling=Handling(neutral=[500]))
+        retargeter.retarget(noisy, options=RetargetOptions(neutral=[500]))
 
 
 def test_what_is_prepared_between_frames_changes_nothing_but_the_time_it_takes(retargeter, noisy):

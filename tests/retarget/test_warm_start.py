@@ -7,9 +7,9 @@ import pytest
 
 import facert
 from facert import Settings
+from facert.data.arrays import rms
 from facert.data.normalisation import Normalisation
 from facert.data.regions import Region, Regions
-from facert.evaluation.metrics import rms
 
 SHARED = Settings(method="ssgplvm", unlabelled=60, latent_dim=4)
 

@@ -49,7 +49,7 @@ def test_the_stiffness_tells_how_much_the_path_is_bent():
     np.testing.assert_allclose(path.stiffness.sum(axis=0), 0.0, atol=1e-12)
 
 
-def test_the_path_is_what_a_gaussian_process_of_its_covariance_foretells():
+def test_the_path_is_what_a_gaussian_process_of_its_covariance_predicts():
     path, given_there = SmoothPath(60, KEYS), values()
     covariance, mean = path.covariance(), given_there.mean(axis=0)
     found = mean + covariance @ np.linalg.pinv(covariance[KEYS]) @ (given_there - mean)

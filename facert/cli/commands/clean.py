@@ -16,7 +16,7 @@ from facert.errors import reading
 if TYPE_CHECKING:
     from facert.data.take import Take
     from facert.retarget.cleaning import Cleaned
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
 
 
 def command(
@@ -70,24 +70,24 @@ def _clean(
 ) -> None:
     """One take."""
     from facert.cli.shared.cleaned_take import read_observed, write_beside
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
 
     take = read_observed(source, target, no_detect)
     with reading(source):
         # Bad markers are hidden by now, if they are to be.
-        cleaned = _cleaned(take, model, Handling(detect=False, sigma=sigma))
+        cleaned = _cleaned(take, model, RetargetOptions(detect=False, sigma=sigma))
     write_beside(cleaned.take, output, overwrite, {"/source/filled": cleaned.filled})
     _print_changes(cleaned, output)
 
 
-def _cleaned(take: Take, model: Path | None, handling: Handling) -> Cleaned:
+def _cleaned(take: Take, model: Path | None, options: RetargetOptions) -> Cleaned:
     from facert.retarget.cleaning import clean, clean_with_model
 
     if model is None:
-        return clean(take, handling.sigma)
+        return clean(take, options.sigma)
     from facert.retarget.model_file import load
 
-    return clean_with_model(take, load(model), handling)
+    return clean_with_model(take, load(model), options)
 
 
 def _print_changes(cleaned: Cleaned, output: Path) -> None:

@@ -13,7 +13,7 @@ from facert.cli.shared import console
 from facert.cli.shared.options import DEVICE, OVERWRITE, SHAPES, TARGET
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 
 if TYPE_CHECKING:
     from facert.data.take import Take

@@ -62,7 +62,7 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Of a model, for people: the settings that its method uses, and plain names of figures."""
     from facert.cli.commands.train import FOR_PEOPLE
-    from facert.methods import method_class
+    from facert.methods.registry import method_class
     from facert.settings import OF_SHARED
 
     settings, figures = facts["settings"], facts["figures"]

@@ -19,7 +19,7 @@ import typer
 
 from facert.cli.commands.train import DEFAULT_MODEL
 from facert.cli.shared import console
-from facert.cli.shared.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_handling
+from facert.cli.shared.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_options
 
 if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
@@ -116,14 +116,14 @@ def command(
         files = [recordings.poses(end.path) for end in ends if isinstance(end, File)]
         senders = _open_senders(stack, ends, controls.names, receiver)
         with reading(source):
-            handling = partial(
-                chosen_handling,
+            options = partial(
+                chosen_options,
                 controls=controls_path,
                 no_detect=no_detect,
                 no_smooth=no_smooth,
                 sigma=sigma,
             )
-            mapper = LiveModel(file, retargeter, pattern, receiver.fps, handling, neutral)
+            mapper = LiveModel(file, retargeter, pattern, receiver.fps, options, neutral)
             stack.enter_context(mapper)
         session = Session(receiver, mapper, senders, files, kept)
         stopped = stack.enter_context(_stopping())

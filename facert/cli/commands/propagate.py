@@ -126,7 +126,7 @@ def _error(result: Take, truth: Take, keys: list[int]) -> str:
     """How far off the frames are whose truth is known, besides the keys; nothing if none is."""
     import numpy as np
 
-    from facert.evaluation.metrics import rms
+    from facert.data.arrays import rms
 
     of_poses = result.params is not None and truth.params is not None
     found = result.params if of_poses else result.source.values

@@ -23,14 +23,14 @@ from facert.cli.shared.options import (
     OUT_DIR,
     OVERWRITE,
     SIGMA,
-    chosen_handling,
+    chosen_options,
 )
 from facert.data.text import plural
 from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data.take import Take
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
 
@@ -79,8 +79,8 @@ def command(
 ) -> None:
     """Write the character's parameters for every frame of a take."""
     todo = plan(paths, out_dir, ending, jobs, overwrite)
-    handling = partial(
-        chosen_handling,
+    options = partial(
+        chosen_options,
         controls=controls,
         no_detect=no_detect,
         no_smooth=no_smooth,
@@ -91,7 +91,7 @@ def command(
         _retarget,
         model=model,
         mode=mode,
-        handling=handling,
+        options=options,
         target=target,
         device=device,
         overwrite=overwrite,
@@ -105,7 +105,7 @@ def _retarget(
     *,
     model: Path,
     mode: Mode,
-    handling: Callable[[Retargeter], Handling],
+    options: Callable[[Retargeter], RetargetOptions],
     target: str | None,
     device: str,
     overwrite: bool,
@@ -120,7 +120,7 @@ def _retarget(
     take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
     with reading(source):
-        result = retargeter.retarget(take, mode.value, handling(retargeter), device)
+        result = retargeter.retarget(take, mode.value, options(retargeter), device)
     seconds = time.perf_counter() - began
     facert.write_take(result, output, overwrite)
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)

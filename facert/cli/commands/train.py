@@ -12,7 +12,7 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET
 from facert.errors import InputError, OutputExistsError, reading
-from facert.methods import REGISTRY
+from facert.methods.registry import REGISTRY
 from facert.settings import OF_SHARED, Settings
 
 if TYPE_CHECKING:
@@ -112,8 +112,9 @@ def command(
         typer.Option("--log", help="CSV file for the training curve of a shared model."),
     ] = None,
     target: TARGET = None,
-    foretold: Annotated[
-        bool, typer.Option("--foretold", help="Learn from poses that a model foretold as well.")
+    predicted: Annotated[
+        bool,
+        typer.Option("--allow-predicted", help="Learn from poses that a model predicted as well."),
     ] = False,
     overwrite: OVERWRITE = False,
 ) -> None:
@@ -138,7 +139,7 @@ def command(
 
     import facert
     from facert.cli.shared.progress import ProgressBar
-    from facert.methods import method_class
+    from facert.methods.registry import method_class
     from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 
     begin = None if start is None else facert.load(start)
@@ -156,7 +157,7 @@ def command(
     overwrite_model = overwrite or continues
     if output.exists() and not overwrite_model:
         raise OutputExistsError(output)
-    data = replace(_read(take, target), std=None) if foretold else _read(take, target)
+    data = replace(_read(take, target), std=None) if predicted else _read(take, target)
     _check_regions(regions, settings.regions, data)
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
@@ -202,7 +203,7 @@ def _check_regions(given: str | None, regions: Regions | str | None, take: Take)
 
 def _warn_of_idle_settings(settings: Settings, unasked: Settings) -> None:
     """Say which settings that somebody chose are the shared models' alone, if another learns."""
-    from facert.methods import method_class
+    from facert.methods.registry import method_class
 
     idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(unasked, name)]
     if idle and not method_class(settings.method).stepwise:

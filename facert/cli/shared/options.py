@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
 TARGET = Annotated[
@@ -66,7 +66,7 @@ DEVICE = Annotated[
 ]
 
 
-def chosen_handling(
+def chosen_options(
     retargeter: Retargeter,
     *,
     controls: Path | None,
@@ -74,13 +74,13 @@ def chosen_handling(
     no_smooth: bool,
     sigma: float | None = None,
     neutral: str | None = None,
-) -> Handling:
+) -> RetargetOptions:
     """What the options ask for, of a take that goes through this model."""
     from facert.data.ranges import parse_frames
     from facert.errors import reading
     from facert.io.toml import read_toml
     from facert.retarget.adjustments import Adjustments
-    from facert.retarget.options import Handling
+    from facert.retarget.options import RetargetOptions
 
     adjustments = None
     if controls is not None:
@@ -88,7 +88,7 @@ def chosen_handling(
             adjustments = Adjustments.of(
                 read_toml(controls, '["jaw*"] gain = 1.2'), retargeter.controls.names
             )
-    return Handling(
+    return RetargetOptions(
         detect=not no_detect,
         smooth=not no_smooth,
         sigma=sigma,

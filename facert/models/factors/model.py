@@ -127,7 +127,7 @@ def learn_factors(evidence: Evidence, guess: FloatArray) -> Factors:
     ----------
     evidence : Evidence
     guess : array, shape (m, d_y)
-        Poses that another method foretells for the frames without one. The search begins at, and
+        Poses that another method predicts for the frames without one. The search begins at, and
         its prior is around, the principal components of frames joined with poses.
     """
     search = _Search(evidence, _principal_factors(evidence, guess))

@@ -1,4 +1,4 @@
-"""What a sparse Gaussian process foretells: from its inducing positions alone.
+"""What a sparse Gaussian process predicts: from its inducing positions alone.
 
 With the factors of `facert.models.gp.sparse`, the mean and the variance at a new position are kᵀα
 and θ1 + θ3⁻¹ - kᵀ L⁻ᵀ (I - B⁻¹) L⁻¹ k, k the kernel against the m inducing positions and

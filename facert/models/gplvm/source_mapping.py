@@ -31,7 +31,7 @@ from facert.models.gp.posterior import PosteriorPoint, Predictor
 from facert.models.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping, Stand
 
 MAX_ITERATIONS = 200  # in all; most frames need three or four
-SHIFTED_DECREMENT = 1e-9  # a shifted step foretells little, however much is left
+SHIFTED_DECREMENT = 1e-9  # a shifted step predicts little, however much is left
 SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
 CHUNK = 128  # frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles
 
@@ -52,13 +52,16 @@ class Observation:
     variance: FloatArray
 
     @classmethod
-    def of(cls, X: FloatArray, sigma_c: float, doubt: FloatArray | None = None) -> Observation:
+    def of(
+        cls, X: FloatArray, sigma_c: float, input_variance: FloatArray | None = None
+    ) -> Observation:
         """Frames (B, d_x) with measurement noise sigma_c, Eq. (13); NaN: not observed.
 
-        Numbers that were not measured but filled in have so much variance more, `doubt` (B, d_x).
+        Numbers that were not measured but filled in have so much variance more, `input_variance`
+        (B, d_x).
         """
         seen = ~np.isnan(X)
-        variance = sigma_c**2 + (0.0 if doubt is None else np.nan_to_num(doubt))
+        variance = sigma_c**2 + (0.0 if input_variance is None else np.nan_to_num(input_variance))
         return cls(np.where(seen, X, 0.0), np.where(seen, variance, np.inf))
 
     def following(self, previous: FloatArray, sigma_t: float) -> Observation:
@@ -240,13 +243,13 @@ class SourceMapping:
                 break
             at = self._expand(z[active] + step, observed[active], scratch)
             fall = energy[active] - at.energy
-            foretold = -descent - 0.5 * np.einsum("bp,bpq,bq->b", step, hessian[active], step)
+            predicted = -descent - 0.5 * np.einsum("bp,bpq,bq->b", step, hessian[active], step)
             better = (descent < 0.0) & (fall >= -ROUNDING)
             good = active[better]
             z[good] += step[better]
             energy[good], gradient[good] = at.energy[better], at.gradient[better]
             hessian[good] = at.hessian[better]
-            shift[active] = _adapted(shift[active], better, fall, foretold)
+            shift[active] = _adapted(shift[active], better, fall, predicted)
         end, x = self._look(z + last, observed)
         return Mapped(z + last, x, hessian, end, converged)
 
@@ -321,14 +324,14 @@ def _leave_saddles(
 
 
 def _adapted(
-    shift: FloatArray, better: BoolArray, fall: FloatArray, foretold: FloatArray
+    shift: FloatArray, better: BoolArray, fall: FloatArray, predicted: FloatArray
 ) -> FloatArray:
-    """The next shift: smaller where the quadratic model foretold the fall well, larger where not.
+    """The next shift: smaller where the quadratic model predicted the fall well, larger where not.
 
-    In a narrow curved valley a step may be better and yet far from what was foretold.
+    In a narrow curved valley a step may be better and yet far from what was predicted.
     """
-    poor = ~better | (fall < 0.25 * foretold - ROUNDING)
-    well = better & (fall > 0.75 * foretold - ROUNDING)
+    poor = ~better | (fall < 0.25 * predicted - ROUNDING)
+    well = better & (fall > 0.75 * predicted - ROUNDING)
     raised = np.maximum(4.0 * shift, SHIFT)
     lowered = np.where(shift > SHIFT, 0.25 * shift, 0.0)
     return np.where(poor, raised, np.where(well, lowered, shift))

@@ -117,7 +117,7 @@ class SCG:
 
 
 def _rescaled(scale: float, curvature: float, comparison: float) -> float:
-    """λ for the next step, by how well the quadratic model foretold this one's decrease."""
+    """λ for the next step, by how well the quadratic model predicted this one's decrease."""
     if comparison < 0.25:
         return max(scale + curvature * (1.0 - comparison), 4.0 * scale)
     if comparison > 0.75:

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data.array_group import Arrays
+from facert.data.array_group import ArrayGroup
 from facert.data.arrays import BoolArray, FloatArray
 
 ITERATIONS = 16
@@ -26,7 +26,7 @@ ONCE_MORE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Factors(Arrays):
+class Factors(ArrayGroup):
     """What moves together.
 
     Parameters

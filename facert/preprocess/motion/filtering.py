@@ -72,7 +72,7 @@ class MotionFilter:
         self._looked = False
 
     def look_ahead(self) -> None:
-        """Foretell the next frame; `step` does it where nobody did."""
+        """Predict the next frame; `step` does it where nobody did."""
         if not self._looked:
             self._shared.look_ahead()
             self._rest.look_ahead()
@@ -101,7 +101,7 @@ class MotionFilter:
         was_off, self._was_off = self._was_off, None
         if not (off > GROSS).any():  # never where NaN
             return seen
-        spread = np.sqrt(shared.variance + rest.foretold)
+        spread = np.sqrt(shared.variance + rest.predicted)
         self._was_off = np.asarray(off > np.maximum(FAR * spread, GROSS))
         is_new = self._was_off if was_off is None else self._was_off & ~was_off
         return ~is_new if seen is None else seen & ~is_new
@@ -160,7 +160,7 @@ class _FactorFilter:
         self._factors, self._last = factors, replace(self._last, settled=False)
 
     def look_ahead(self) -> None:
-        """Foretell the next frame, and what it will do if it shows what the last one did."""
+        """Predict the next frame, and what it will do if it shows what the last one did."""
         factors, last = self._factors, self._last
         self._m_ahead = self._F @ self._m
         self.expected = factors.mean + factors.weights @ self._m_ahead[: factors.count]
@@ -217,7 +217,7 @@ class _SeriesFilter:
         self._P, self._gain = self._prior, np.zeros_like(self._m)
         self._P_ahead = self._prior
         self._width = np.ones_like(self._prior[0])
-        self._found = self._foretold = self._prior[0] + self._noise
+        self._found = self._predicted = self._prior[0] + self._noise
 
     @property
     def expected(self) -> FloatArray:
@@ -225,7 +225,7 @@ class _SeriesFilter:
         return np.asarray(self._m_ahead[0])
 
     @property
-    def foretold(self) -> FloatArray:
+    def predicted(self) -> FloatArray:
         """Their variance, with the noise, (d,)."""
         return np.asarray(self._P_ahead[0] + self._noise)
 
@@ -237,12 +237,12 @@ class _SeriesFilter:
     def hear(self, noise: float) -> None:
         """Go on with another variance of the noise."""
         before, self._noise = self._noise, noise
-        self._foretold = self._foretold + (noise - before)
+        self._predicted = self._predicted + (noise - before)
         if not before / MISHEARD < noise < before * MISHEARD:
             self._begin()  # what was learned took noise for motion, or motion for noise
 
     def look_ahead(self) -> None:
-        """Foretell the next values."""
+        """Predict the next values."""
         m, P = self._m, self._P - self._gain[[0, 0, 1]] * self._P[[0, 1, 1]]
         self._m_ahead = self._F[:, 0] * m[0] + self._F[:, 1] * m[1]
         self._P_ahead = (self._forward * P).sum(axis=1) + self._width * self._drift
@@ -260,8 +260,8 @@ class _SeriesFilter:
         """How much wider than so far each is taken to vary, after this surprise."""
         fresh = 1.0 - MEMORY if seen is None else (1.0 - MEMORY) * seen
         self._found = self._found + fresh * (surprise * surprise - self._found)
-        self._foretold = self._foretold + fresh * (self.foretold - self._foretold)
-        ratio = (self._found - self._noise) / np.maximum(self._foretold - self._noise, TINY)
+        self._predicted = self._predicted + fresh * (self.predicted - self._predicted)
+        ratio = (self._found - self._noise) / np.maximum(self._predicted - self._noise, TINY)
         change = np.minimum(np.maximum(ratio, FALL), RISE)  # np.clip takes three times as long
         before = self._width
         widened = before * (change if seen is None else np.where(seen, change, 1.0))

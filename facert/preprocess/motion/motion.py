@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from facert.data.array_group import Arrays
+from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray, IntArray
 from facert.preprocess.motion.factors import Factors
 from facert.preprocess.motion.interpolation import interpolated
@@ -37,7 +37,7 @@ LEAST_VARIANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(Arrays):
+class Motion(ArrayGroup):
     """How normalised frames move, learned from a take.
 
     Parameters
@@ -54,7 +54,7 @@ class Motion(Arrays):
     """
 
     axes: ClassVar[Mapping[str, str]] = {"rates": "q", "rest": "x", "rest_rates": "x", "clock": "2"}
-    parts: ClassVar[Mapping[str, type[Arrays]]] = {"factors": Factors}
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {"factors": Factors}
 
     factors: Factors
     rates: FloatArray
@@ -122,8 +122,8 @@ class Motion(Arrays):
         found = smooth_factors(*factors.information(X), self.rates)
         frames = factors.frames(found.mean)
         left = np.where(seen, X - frames, np.nan)
-        rest, doubt = smooth_series(left, seen, self.rest, sigma**2, self.rest_rates)
-        variance = factors.variance(found.covariance) + doubt
+        rest, input_variance = smooth_series(left, seen, self.rest, sigma**2, self.rest_rates)
+        variance = factors.variance(found.covariance) + input_variance
         # The layers take each other for noise: of what was seen, both know less than it told.
         return frames + rest, np.where(seen, np.minimum(variance, sigma**2), variance)
 

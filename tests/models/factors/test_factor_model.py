@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 from facert.methods.linear import leave_one_out_ridge
 from facert.models.factors import model
 from facert.models.factors.censoring import Limits

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facert.evaluation.metrics import rms
+from facert.data.arrays import rms
 from facert.preprocess.motion.calibration import RANGE, error_of_filling
 from facert.preprocess.motion.estimate import estimate
 
@@ -34,7 +34,7 @@ def hide(frames, seed=1):
 
 @pytest.mark.parametrize("own", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("noise", [0.001, 0.05])
-def test_errors_are_foretold_within_a_factor_of_two(own, noise):
+def test_errors_are_predicted_within_a_factor_of_two(own, noise):
     truth = moving(own=own)
     given, hidden = hide(truth + noise * np.random.default_rng(2).normal(size=truth.shape))
     found = estimate(given, np.arange(FRAMES) / 30.0)

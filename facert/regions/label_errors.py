@@ -1,4 +1,4 @@
-"""How well some markers foretell controls, told by the labels alone."""
+"""How well some markers predict controls, told by the labels alone."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from facert.models.whitening import whitening
-from facert.regions.foretelling import FREE, POWER, RIDGE, left_out_errors
+from facert.regions.label_errors import FREE, POWER, RIDGE, left_out_errors
 
 
 def make_data(seed=0, labels=9):
@@ -13,7 +13,7 @@ def make_data(seed=0, labels=9):
     return frames, frames[:labels], poses
 
 
-def test_each_label_is_foretold_from_the_others():
+def test_each_label_is_predicted_from_the_others():
     frames, labelled, poses = make_data()
     features = (labelled - labelled.mean(axis=0)) @ whitening(frames, POWER)
     K = features @ features.T

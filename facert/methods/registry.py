@@ -1,0 +1,50 @@
+"""The registry of methods: to add one, write a file with its class, and one line here."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+from facert.errors import InputError
+from facert.settings import Settings
+
+if TYPE_CHECKING:
+    from facert.methods.base import Method
+
+# Name: module and class. A module is loaded with its first method: the libraries behind them take
+# their time, and the names alone are wanted for help.
+REGISTRY = {
+    "auto": ("blend", "Auto"),
+    "ssgpr": ("ssgpr", "SemiSupervisedGPR"),
+    "ssgplvm": ("shared_gplvm", "SemiSupervisedSGPLVM"),
+    "sgplvm": ("shared_gplvm", "SupervisedSGPLVM"),
+    "gpr": ("gpr", "GPR"),
+    "gpr-linear": ("gpr", "LinearGPR"),
+    "svr": ("svr", "SVR"),
+    "ridge": ("linear", "Ridge"),
+    "pls": ("linear", "PLS"),
+    "rbf": ("interpolation", "RBF"),
+    "nearest": ("interpolation", "Nearest"),
+}
+
+
+def method_class(name: str) -> type[Method]:
+    """The class of a method.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name not in REGISTRY:
+        raise InputError(
+            "method", "one of " + ", ".join(REGISTRY), repr(name), "Choose one of these."
+        )
+    module, class_name = REGISTRY[name]
+    found: type[Method] = getattr(importlib.import_module(f"facert.methods.{module}"), class_name)
+    return found
+
+
+def make_method(settings: Settings) -> Method:
+    """A method by the name in the settings; raises InputError when there is none of that name."""
+    return method_class(settings.method)(settings)
