@@ -16,6 +16,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from facert.data.version import VERSION
+
 if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Controls, Source, Take
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from facert.retarget.training import train
     from facert.settings import Settings
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 __all__ = [
     "Controls",

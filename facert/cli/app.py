@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-import facert
 from facert.cli.commands import (
     clean,
     convert,
@@ -35,6 +34,7 @@ from facert.cli.commands import (
     view,
 )
 from facert.cli.shared import console
+from facert.data.version import CREATED_BY
 from facert.errors import FacertError
 
 ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")
@@ -71,7 +71,7 @@ app = typer.Typer(
 
 def _print_version(asked: bool) -> None:
     if asked:
-        console.out.print(f"facert {facert.__version__}")
+        console.out.print(CREATED_BY)
         raise typer.Exit
 
 

@@ -16,8 +16,8 @@ from threading import Thread
 
 import numpy as np
 
-import facert
 from facert.data.take import Take
+from facert.data.version import VERSION
 from facert.errors import FacertError
 from facert.evaluation.cells import Cell, Outcome, evaluate
 from facert.evaluation.protocol import Problem, draw
@@ -108,9 +108,7 @@ def run(
 def fingerprint(problem: Problem, settings: Settings | None = None) -> str:
     """What outcomes of cells depend on, apart from the cell: data, protocol, settings, version."""
     given = replace(settings or Settings(), method="", labels=None, unlabelled=0, seed=0)
-    digest = hashlib.sha256(
-        repr((facert.__version__, problem.protocol, problem.across, given)).encode()
-    )
+    digest = hashlib.sha256(repr((VERSION, problem.protocol, problem.across, given)).encode())
     for take in (problem.take, problem.test):
         _add_take(digest, take)
     if problem.gram is not None:

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import facert
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.units import in_metres
+from facert.data.version import CREATED_BY
 from facert.errors import InputError
 from facert.io.atomic import replacing
 from facert.mesh.morphs import Morphs
@@ -110,7 +110,7 @@ def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
     moving = len(morphs.time) > 1
     animations = {"animations": [_animation(morphs, name, buffer)]} if moving else {}
     return {
-        "asset": {"version": "2.0", "generator": f"facert {facert.__version__}"},
+        "asset": {"version": "2.0", "generator": CREATED_BY},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [node],

@@ -18,8 +18,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-import facert
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.version import CREATED_BY
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.text import existing_file
@@ -295,7 +295,7 @@ def create(path: Path, format_name: str, version: int, overwrite: bool) -> Itera
         new = NewFile(file)
         new.attribute("format", format_name)
         new.attribute("format_version", version)
-        new.attribute("created_by", f"facert {facert.__version__}")
+        new.attribute("created_by", CREATED_BY)
         yield new
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-import facert
 from facert.data.units import in_metres
+from facert.data.version import CREATED_BY
 from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
 from facert.mesh.morphs import Morphs
@@ -65,7 +65,7 @@ def write_usd(
         mesh = _mesh(stage, morphs)
         _bind(stage, mesh, _animation(stage, morphs, tokens, fps), len(morphs.neutral.vertices))
         _blend_shapes(stage, mesh, morphs, tokens)
-        stage.GetRootLayer().comment = f"facert {facert.__version__}"
+        stage.GetRootLayer().comment = CREATED_BY
         stage.GetRootLayer().Save()
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-import facert
 from facert.data.arrays import FloatArray
+from facert.data.version import CREATED_BY
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import read_tensors, write_tensors
 from facert.models.optim.base import State
@@ -82,7 +82,7 @@ class CheckpointFile(Monitor):
         metadata = {
             "format": FORMAT,
             "format_version": 1,
-            "created_by": f"facert {facert.__version__}",
+            "created_by": CREATED_BY,
             "fingerprint": self._fingerprint,
         }
         write_tensors(self.path, arrays, metadata, overwrite=True)

@@ -9,11 +9,11 @@ from typing import get_args
 
 import numpy as np
 
-import facert
 from facert.data.array_group import check_axes
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, SourceKind
+from facert.data.version import CREATED_BY
 from facert.errors import InputError, reading
 from facert.io.tensors import read_tensors, write_tensors
 from facert.preprocess.motion.motion import Motion
@@ -52,7 +52,7 @@ def save(retargeter: Retargeter, path: Path, overwrite: bool) -> None:
     metadata = {
         "format": FORMAT,
         "format_version": 1,
-        "created_by": f"facert {facert.__version__}",
+        "created_by": CREATED_BY,
         "versions": library_versions(),
         **retargeter.facts,
     }

@@ -191,7 +191,7 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
     """The resolved settings, for the JSON file."""
     from dataclasses import asdict
 
-    import facert
+    from facert.data.version import CREATED_BY
     from facert.retarget.model_file import library_versions
 
     return {
@@ -200,7 +200,7 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
         "split": "across" if problem.across else problem.protocol.split,
         "frames": len(problem.take),
         "controls": problem.controls.names,
-        "created_by": f"facert {facert.__version__}",
+        "created_by": CREATED_BY,
         "versions": library_versions(),
     }
 

@@ -1,0 +1,4 @@
+"""The release of facert, which the files that it writes name."""
+
+VERSION = "0.1.0"
+CREATED_BY = f"facert {VERSION}"
