@@ -35,7 +35,7 @@ from experiments.bench.problem import bench_take
 from facert import Settings, train
 from facert.data.arrays import FloatArray
 from facert.data.take import Source, Take
-from facert.live.livelink import PACKET_NAMES, LiveLinkEncoder
+from facert.live.livelink_packets import PACKET_NAMES, LiveLinkEncoder
 
 WARM = 2.0
 """Seconds at the beginning that memory is not counted of."""
@@ -45,7 +45,7 @@ CLOCK, APPLY = b"/VMC/Ext/T\0\0,f\0\0", b"/VMC/Ext/Blend/Apply"
 
 
 @dataclass(frozen=True)
-class Session:
+class LiveSession:
     """A running `facert live`."""
 
     process: subprocess.Popen[str]
@@ -82,7 +82,7 @@ def play(port: int, weights: FloatArray, rate: float, sent: SynchronizedArray) -
 
 
 @contextmanager
-def session(model: Path, to: int, options: list[str]) -> Iterator[Session]:
+def session(model: Path, to: int, options: list[str]) -> Iterator[LiveSession]:
     """`facert live` in a process of its own."""
     command = [
         *(sys.executable, "-c", "from facert.cli.app import main; main()"),
@@ -98,7 +98,7 @@ def session(model: Path, to: int, options: list[str]) -> Iterator[Session]:
             line = process.stderr.readline()
             assert line, "it ended before it listened"
             found = re.search(r"listens for .*:(\d+) ", line)
-        yield Session(process, int(found[1]))
+        yield LiveSession(process, int(found[1]))
 
 
 def listen(engine: socket.socket, rate: float, count: int) -> FloatArray:
@@ -126,7 +126,7 @@ def listen(engine: socket.socket, rate: float, count: int) -> FloatArray:
 class Memory(threading.Thread):
     """Looks at a process's memory now and then."""
 
-    def __init__(self, running: Session) -> None:
+    def __init__(self, running: LiveSession) -> None:
         super().__init__(daemon=True)
         self._running = running
         self.found: list[float] = []

@@ -5,7 +5,7 @@
 records it all.
 """
 
-from facert.demo.takes import (
+from facert.demo.files import (
     actor_rig,
     character_rig,
     performance_take,

@@ -9,7 +9,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.demo import parts
 from facert.demo.build import Build
-from facert.demo.parts import Piece
+from facert.demo.parts import Patch
 from facert.demo.skin import skin
 
 
@@ -72,10 +72,10 @@ def make_head(build: Build) -> Head:
     )
 
 
-def _join(pieces: list[Piece]) -> tuple[Piece, IntArray]:
+def _join(pieces: list[Patch]) -> tuple[Patch, IntArray]:
     """One piece out of many, and the tissue of each vertex."""
     starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
-    joined = Piece(
+    joined = Patch(
         np.vstack([piece.vertices for piece in pieces]),
         np.vstack([piece.faces + start for piece, start in zip(pieces, starts, strict=False)]),
         np.vstack([piece.colours for piece in pieces]),

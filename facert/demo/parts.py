@@ -26,7 +26,7 @@ class Tissue(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Patch:
     """A patch: vertices (V, 3), triangles (F, 3) seen anticlockwise, colours (V, 3)."""
 
     vertices: FloatArray
@@ -48,7 +48,7 @@ def strips(grid: IntArray, *, closed: bool = False) -> IntArray:
     return np.asarray(faces.reshape(-1, 3), dtype=np.int64)
 
 
-def eyeball(build: Build) -> Piece:
+def eyeball(build: Build) -> Patch:
     """Rings around the line of sight, with pupil, iris and white."""
     eye, sides = build.eye, 20
     edge = 0.02
@@ -63,7 +63,7 @@ def eyeball(build: Build) -> Piece:
     directions = np.vstack([[[0.0, 0.0, 1.0]], rings.reshape(-1, 3)])
     grid = 1 + np.arange(rings.shape[0] * sides).reshape(-1, sides)
     fan = np.column_stack([np.zeros(sides, dtype=int), grid[0], np.roll(grid[0], -1)])
-    return Piece(
+    return Patch(
         directions * eye.ball + eye.centre,
         np.vstack([fan, strips(grid[::-1], closed=True)]),
         np.vstack([colours[:1], np.repeat(colours[1:], sides, axis=0)]),
@@ -71,7 +71,7 @@ def eyeball(build: Build) -> Piece:
     )
 
 
-def brow(build: Build) -> Piece:
+def brow(build: Build) -> Patch:
     """A ribbon of hair that lies on the skin."""
     shape = build.brow
     along = np.linspace(0, 1, 12)[:, None]
@@ -88,7 +88,7 @@ def brow(build: Build) -> Piece:
     return _patch(np.stack(rows), lift, build, build.palette.hair)
 
 
-def teeth(build: Build) -> tuple[Piece, Piece]:
+def teeth(build: Build) -> tuple[Patch, Patch]:
     """The upper row on the skull and the lower row on the jaw."""
     mouth = build.mouth
     x = np.linspace(0, 0.82 * mouth.width, 8)
@@ -96,12 +96,12 @@ def teeth(build: Build) -> tuple[Piece, Piece]:
     z = front - 0.9 * mouth.width * (x / mouth.width / 1.1) ** 2
     height = mouth.upper + mouth.lower
 
-    def row(top: float, bottom: float, tissue: Tissue) -> Piece:
+    def row(top: float, bottom: float, tissue: Tissue) -> Patch:
         y = mouth.centre[1] + np.array([bottom, top])
         vertices = np.stack([np.stack([x, np.full_like(x, level), z], -1) for level in y])
         colours = np.tile(TOOTH, (vertices.shape[0] * vertices.shape[1], 1))
         grid = np.arange(2 * len(x)).reshape(2, -1)
-        return Piece(vertices.reshape(-1, 3), strips(grid), colours, tissue)
+        return Patch(vertices.reshape(-1, 3), strips(grid), colours, tissue)
 
     return (
         row(0.5 * height, -0.26 * height, Tissue.SKULL),
@@ -109,7 +109,7 @@ def teeth(build: Build) -> tuple[Piece, Piece]:
     )
 
 
-def ear(build: Build) -> Piece:
+def ear(build: Build) -> Patch:
     """A leaf with a hollow, at the side of the head."""
     shape, rows, sides = build.ear, 10, 14
     width, length = shape.reach
@@ -136,10 +136,10 @@ def ear(build: Build) -> Piece:
     faces = strips(grid[:, ::-1] if right_handed else grid, closed=True)
     skin, blush = np.array(build.palette.skin), np.array(build.palette.blush)
     shade = np.clip(hollow * 1.2, 0, 0.8).reshape(-1, 1)
-    return Piece(vertices.reshape(-1, 3), faces, skin + shade * (blush - skin))
+    return Patch(vertices.reshape(-1, 3), faces, skin + shade * (blush - skin))
 
 
-def hair(build: Build) -> Piece:
+def hair(build: Build) -> Patch:
     """A cap of hair; its edge dips below the skin, which draws a clean hairline."""
     shape, rows, sides = build.hair, 12, 22
     crown = np.array(shape.crown) / np.linalg.norm(shape.crown)
@@ -162,14 +162,14 @@ def hair(build: Build) -> Piece:
     vertices[:, [0, -1], 0] = 0
     grid = np.arange(rows * sides).reshape(rows, sides)
     colours = np.tile(build.palette.hair, (grid.size, 1))
-    return Piece(vertices.reshape(-1, 3), strips(grid[::-1]), colours, Tissue.SKULL)
+    return Patch(vertices.reshape(-1, 3), strips(grid[::-1]), colours, Tissue.SKULL)
 
 
-def _patch(points: FloatArray, lift: ArrayLike, build: Build, colour: Colour) -> Piece:
+def _patch(points: FloatArray, lift: ArrayLike, build: Build, colour: Colour) -> Patch:
     """A grid in front view (R, n, 2), laid on the skin and lifted off it."""
     flat = points.reshape(-1, 2)
     vertices = cast_from_front(flat, build.blobs)
     outwards = (vertices - ORIGIN) / np.linalg.norm(vertices - ORIGIN, axis=1, keepdims=True)
     vertices = vertices + np.reshape(lift, (-1, 1)) * outwards
     grid = np.arange(len(flat)).reshape(points.shape[:2])
-    return Piece(vertices, strips(grid), np.tile(colour, (len(flat), 1)))
+    return Patch(vertices, strips(grid), np.tile(colour, (len(flat), 1)))

@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay, cKDTree
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.demo.build import Build
 from facert.demo.clay import FORWARD, ORIGIN, cast_from_front, cast_from_inside
-from facert.demo.parts import Piece, strips
+from facert.demo.parts import Patch, strips
 
 INSIDE = (0.16, 0.05, 0.06)
 LASHES = (0.20, 0.11, 0.09)
@@ -28,7 +28,7 @@ class Skin:
 
     Attributes
     ----------
-    piece : Piece
+    piece : Patch
     lids : array of int, shape (4, n)
         Loops around the eye, from the inner edge of the lids outwards; a loop starts at the outer
         corner and runs over the upper lid.
@@ -36,7 +36,7 @@ class Skin:
         Rows of the mouth from the inside outwards; a row starts in the middle of the upper lip.
     """
 
-    piece: Piece
+    piece: Patch
     lids: IntArray
     lips: IntArray
 
@@ -64,7 +64,7 @@ def skin(build: Build) -> Skin:
             _triangulate(vertices, rest, (lid_grid[-1], lip_grid[-1])),
         ]
     )
-    piece = Piece(vertices, faces, _colours(vertices, lid_grid, lip_grid, build))
+    piece = Patch(vertices, faces, _colours(vertices, lid_grid, lip_grid, build))
     return Skin(piece, lid_grid, lip_grid)
 
 

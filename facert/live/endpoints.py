@@ -11,7 +11,7 @@ from facert.data.take import Take
 from facert.errors import InputError
 from facert.live.frames import Counters, Decoder, Encoder
 from facert.live.ifacialmocap import IFacialMocapDecoder
-from facert.live.livelink import LiveLinkDecoder, LiveLinkEncoder
+from facert.live.livelink_packets import LiveLinkDecoder, LiveLinkEncoder
 from facert.live.receivers import UdpReceiver
 from facert.live.senders import SocketAddress, UdpSender, written_place
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder

@@ -37,7 +37,7 @@ class Limits:
         return cls(frames or math.inf, seconds or math.inf)
 
 
-class Session:
+class LiveSession:
     """Maps what a receiver brings, and sends the poses before anything is recorded.
 
     A frame is mapped as soon as it is there. Where several have come meanwhile, as after a

@@ -24,7 +24,7 @@ _WORD = 4
 Use = TypeVar("Use")
 
 
-class Layout:
+class PacketTemplate:
     """One datagram whose numbers may be anything.
 
     Parameters
@@ -50,11 +50,11 @@ class Layout:
             return words.view(">f4").take(self._places).astype(np.float64)
 
 
-class Layouts(Generic[Use]):
+class PacketTemplates(Generic[Use]):
     """The datagrams that came before, up to a limit, each with what its numbers are used for."""
 
     def __init__(self) -> None:
-        self._known: dict[int, list[tuple[Layout, Use]]] = {}
+        self._known: dict[int, list[tuple[PacketTemplate, Use]]] = {}
 
     def find(self, packet: bytes) -> tuple[Use, FloatArray] | None:
         """Of one that is like this: its use, and the numbers of this."""
@@ -72,4 +72,4 @@ class Layouts(Generic[Use]):
             return
         alike = self._known.get(len(packet), [])
         if len(alike) < MOST_ALIKE and (alike or len(self._known) < MOST_LENGTHS):
-            self._known[len(packet)] = [*alike, (Layout(packet, messages), use)]
+            self._known[len(packet)] = [*alike, (PacketTemplate(packet, messages), use)]

@@ -88,8 +88,8 @@ def _free(path: Path) -> Path:
     return place
 
 
-class Rows:
-    """Rows of numbers, all equally long, in a nameless file: memory does not grow with time."""
+class SpooledRows:
+    """SpooledRows of numbers, all equally long, in a nameless file: memory does not grow with time."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115
@@ -135,7 +135,7 @@ class SourceRecord:
 
     def __init__(self, file: TakeFile, like: Take) -> None:
         file.rehearse(like)
-        self._file, self._like, self._rows = file, like, Rows()
+        self._file, self._like, self._rows = file, like, SpooledRows()
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
@@ -176,7 +176,7 @@ class PoseRecord:
 
     def __init__(self, file: TakeFile, like: Take, controls: Controls) -> None:
         file.rehearse(replace(like, controls=controls, params=np.zeros((1, len(controls.names)))))
-        self._file, self._like, self._controls, self._rows = file, like, controls, Rows()
+        self._file, self._like, self._controls, self._rows = file, like, controls, SpooledRows()
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Keep a pose, its standard deviation, and its source."""

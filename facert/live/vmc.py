@@ -26,7 +26,7 @@ from facert.data.names import NameIndex
 from facert.data.take import SourceKind
 from facert.live.frames import BadPacketError, Observed, frame_pattern
 from facert.live.osc import Bundles, Message, message, parse
-from facert.live.osc_layout import Layouts
+from facert.live.osc_layout import PacketTemplates
 
 _VMC = "/VMC/"
 _VALUE, _CLOCK, _APPLY = "/VMC/Ext/Blend/Val", "/VMC/Ext/T", "/VMC/Ext/Blend/Apply"
@@ -80,11 +80,11 @@ class OscDecoder:
         self._empty = np.full((len(names), self._numbers), np.nan)
         self._values = self._empty.copy()
         self._stamp: float | None = None
-        self._layouts: Layouts[_Use] = Layouts()
+        self._templates: PacketTemplates[_Use] = PacketTemplates()
 
     def decode(self, packet: bytes) -> Observed | None:
         """What the packet tells; see `facert.live.frames.Decoder`."""
-        found = self._layouts.find(packet)
+        found = self._templates.find(packet)
         if found is not None:
             return self._filled(*found)
         messages = parse(packet)
@@ -100,12 +100,12 @@ class OscDecoder:
                 self._note(one)
         use = self._use(messages)
         if use is not None:
-            self._layouts.remember(packet, messages, use)
+            self._templates.remember(packet, messages, use)
         return observed
 
     def rehearse(self, packet: bytes) -> None:
         """See `facert.live.frames.Decoder`."""
-        self._layouts.find(packet)
+        self._templates.find(packet)
 
     def _filled(self, use: _Use, numbers: FloatArray) -> Observed | None:
         """What a datagram tells that is like one before, by its numbers."""

@@ -14,13 +14,13 @@ from viser import Icon
 
 from facert.data.rig import Rig
 from facert.errors import InputError
-from facert.pages.desk import Desk, slider_bounds
+from facert.pages.pose_editor import PoseEditor, slider_bounds
 from facert.pages.playback import Playback
 from facert.pages.pose_stage import SAMPLES, PoseStage
 from facert.pages.server import complainer
-from facert.pages.session import Session, Trained
+from facert.pages.session import PosingSession, Trained
 from facert.pages.sliders import Pins, Sliders
-from facert.pages.timeline import Places, Timeline
+from facert.pages.timeline import FrameList, Timeline
 from facert.pages.worker import Worker
 from facert.render.faces import Face
 
@@ -45,16 +45,16 @@ class PosePage:
     server : ViserServer
     rig : Rig
         The character.
-    session : Session
+    session : PosingSession
     actor : Face, optional
         The actor's face, for a source of weights.
     """
 
     def __init__(
-        self, server: ViserServer, rig: Rig, session: Session, actor: Face | None = None
+        self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None = None
     ) -> None:
         self._server, self.session = server, session
-        self.desk = Desk(session.controls, session.known)
+        self.editor = PoseEditor(session.controls, session.known)
         self.playback = Playback(np.zeros(1) if session.take is None else session.take.time)
         self._seed, self._clock = 0, time.perf_counter()
         self._drafts: dict[int, dict[int, float]] = {}  # what is pinned in frames that were left
@@ -81,11 +81,11 @@ class PosePage:
 
     def pin(self, control: int, value: float) -> None:
         """Hold a control; the others follow."""
-        self._change(("pin", control), lambda: self.desk.pin(control, value))
+        self._change(("pin", control), lambda: self.editor.pin(control, value))
 
     def let_go(self, control: int) -> None:
         """Let a control follow."""
-        self._change(("let go", control), lambda: self.desk.let_go(control))
+        self._change(("let go", control), lambda: self.editor.let_go(control))
 
     def save(self) -> None:
         """Make the pose the label of the frame."""
@@ -111,8 +111,8 @@ class PosePage:
         self.worker.do(key, task)
 
     def _go(self, frame: int) -> None:
-        if self.desk.pins:
-            self._drafts[self.playback.frame] = dict(self.desk.pins)
+        if self.editor.pins:
+            self._drafts[self.playback.frame] = dict(self.editor.pins)
         self.playback.seek(frame)
         self._begin()
 
@@ -120,8 +120,8 @@ class PosePage:
         """With what is known of the frame, and what was pinned when it was last looked at."""
         frame = self.playback.frame
         if self.session.take is not None:
-            self.desk.begin(*self.session.pose(frame))
-            self.desk.pin_all(self._drafts.pop(frame, {}))
+            self.editor.begin(*self.session.pose(frame))
+            self.editor.pin_all(self._drafts.pop(frame, {}))
         self._show()
 
     def _tick(self) -> None:
@@ -131,26 +131,26 @@ class PosePage:
             self._begin()
 
     def _show(self) -> None:
-        frame, desk = self.playback.frame, self.desk
-        self._stage.draw(frame, desk.pose)
-        self._sliders.show(desk.pose, desk.pins)
-        self._pins.show(desk.pins)
-        self._adopt.visible, self._free.visible = False, len(desk.pins) > 1
+        frame, editor = self.playback.frame, self.editor
+        self._stage.draw(frame, editor.pose)
+        self._sliders.show(editor.pose, editor.pins)
+        self._pins.show(editor.pins)
+        self._adopt.visible, self._free.visible = False, len(editor.pins) > 1
         if self._timeline is not None:
             self._timeline.show(frame)
         self._say(self._status, self._state(frame))
 
     def _state(self, frame: int) -> str:
         """What the pose is, in a line."""
-        desk, session = self.desk, self.session
-        if desk.far:
+        editor, session = self.editor, self.session
+        if editor.far:
             return "No known pose comes near what is pinned: the rest is a guess."
-        if desk.pins and desk.known is None:
+        if editor.pins and editor.known is None:
             return "Nothing is known of this character yet: pose three frames, and it follows."
-        if desk.pins:
-            spread = float(np.sqrt(np.mean(desk.std**2)))
+        if editor.pins:
+            spread = float(np.sqrt(np.mean(editor.std**2)))
             return f"The other controls follow, ± {spread:.2f}."
-        if desk.from_neutral:
+        if editor.from_neutral:
             return "Neutral. Move a slider: it is pinned, and the others follow."
         if session.labelled(frame):
             return "The frame's label."
@@ -158,8 +158,8 @@ class PosePage:
 
     def _save(self) -> None:
         frame = self.playback.frame
-        path = self.session.save(frame, self.desk.pose)
-        self.desk.learn(self.session.known)
+        path = self.session.save(frame, self.editor.pose)
+        self.editor.learn(self.session.known)
         self._mark()
         self._begin()
         self._say(self._news, f"Frame {frame} saved to {escape(path.name)}.")
@@ -178,8 +178,8 @@ class PosePage:
         moved = "" if trained.change is None else f" Poses moved by {trained.change:.3f} (RMS)."
         path = self.session.model_path
         where = "" if path is None else f" {escape(path.name)} is written."
-        self.desk.learn(self.session.known)
-        if not self.desk.pins:
+        self.editor.learn(self.session.known)
+        if not self.editor.pins:
             self._begin()
         said = f"Learned from {trained.labels} labels in {trained.seconds:.1f} s.{moved}{where}"
         self._say(self._news, said)
@@ -200,7 +200,7 @@ class PosePage:
 
     def _sample(self) -> None:
         self._seed += 1
-        poses = self.desk.samples(SAMPLES, self._seed)
+        poses = self.editor.samples(SAMPLES, self._seed)
         self._samples = poses
         self._stage.show_samples(poses)
         self._adopt.visible = len(poses) > 0
@@ -216,7 +216,7 @@ class PosePage:
         panel = self._server.gui.add_panel()
         with panel.add_tab("Controls"):
             self._sliders = Sliders(
-                self._server, self.desk.controls.names, slider_bounds(self.desk), self.pin
+                self._server, self.editor.controls.names, slider_bounds(self.editor), self.pin
             )
         panel.dock_left()
         panel.set_width(LEFT)
@@ -225,27 +225,27 @@ class PosePage:
         self._timeline: Timeline | None = None
         if self.session.take is not None:
             self._timeline = Timeline(self._server, self.session.take, self.playback, self.seek)
-            self._places = Places(self._server, "Pose next", self.seek)
+            self._places = FrameList(self._server, "Pose next", self.seek)
             self._places.show([])
 
     def _add_pose(self) -> None:
         gui = self._server.gui
         self._status = gui.add_html("")
-        self._pins = Pins(self._server, self.desk.controls.names, self.let_go)
+        self._pins = Pins(self._server, self.editor.controls.names, self.let_go)
         self._free = gui.add_button("Let all go", icon=Icon.PINNED_OFF, color="gray")
         neutral = gui.add_button("Start from neutral", icon=Icon.MOOD_NEUTRAL, color="gray")
         other = gui.add_button("Other plausible poses", icon=Icon.ARROWS_SHUFFLE, color="gray")
         self._adopt = gui.add_button_group(
             "take over", tuple(f"other {number}" for number in range(1, SAMPLES + 1)), visible=False
         )
-        self._free.on_click(lambda _: self._change("let all go", self.desk.let_all_go))
-        neutral.on_click(lambda _: self._change("neutral", lambda: self.desk.begin(None)))
+        self._free.on_click(lambda _: self._change("let all go", self.editor.let_all_go))
+        neutral.on_click(lambda _: self._change("neutral", lambda: self.editor.begin(None)))
         other.on_click(lambda _: self.worker.do("sample", self._sample))
 
         @self._adopt.on_click
         def _(_: object) -> None:
             chosen = int(self._adopt.value.split()[-1]) - 1
-            self._change("adopt", lambda: self.desk.adopt(self._samples[chosen]))
+            self._change("adopt", lambda: self.editor.adopt(self._samples[chosen]))
 
     def _add_learning(self) -> None:
         gui = self._server.gui

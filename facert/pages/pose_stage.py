@@ -10,7 +10,7 @@ from facert.data.arrays import FloatArray
 from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.pages.paint import skin
-from facert.pages.session import Session
+from facert.pages.session import PosingSession
 from facert.pages.stage import FacePart, MarkerPart, Stage
 from facert.render.faces import Face
 
@@ -29,7 +29,9 @@ class PoseStage:
         When the rig lacks a shape for a control.
     """
 
-    def __init__(self, server: ViserServer, rig: Rig, session: Session, actor: Face | None) -> None:
+    def __init__(
+        self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None
+    ) -> None:
         self._rig, self._drivers = rig, shape_drivers(session.controls.names, rig.names)
         self._stage = Stage(server)
         self._source = None if session.take is None else session.take.source

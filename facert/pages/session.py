@@ -40,7 +40,7 @@ class Trained:
     change: float | None
 
 
-class Session:
+class PosingSession:
     """Posing a take, frame by frame.
 
     Parameters

@@ -28,7 +28,7 @@ CENTRE = np.array([0.0, -0.03, 0.0])  # of the first row
 FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 GAP = 0.08  # between two parts; each is 1 high or wide
 ASPECT = 1.2  # of the picture, width over height, until a browser tells
-APRON = 0.004  # how deep, see `Piece`
+APRON = 0.004  # how deep, see `ColourLayer`
 _POINT = 0.022
 _TURNED = 1e-3  # of the line across the view: less is not worth a message
 
@@ -68,7 +68,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class ColourLayer:
     """The part of a mesh that has one colour, with an apron: the triangles around it.
 
     The browser computes a vertex's normal from the piece's triangles alone: without the apron
@@ -89,13 +89,13 @@ class Piece:
     faces: IntArray
 
 
-def piece_of(faces: IntArray, chosen: BoolArray) -> Piece:
+def colour_layer(faces: IntArray, chosen: BoolArray) -> ColourLayer:
     """The piece of chosen triangles, (F,), of a mesh (F, 3)."""
     inside = np.zeros(int(faces.max(initial=-1)) + 1, dtype=np.bool_)
     inside[faces[chosen]] = True
     triangles = faces[inside[faces].any(axis=1)]
     used, compact = np.unique(triangles, return_inverse=True)
-    return Piece(used, inside[used], compact.reshape(-1, 3))
+    return ColourLayer(used, inside[used], compact.reshape(-1, 3))
 
 
 class FacePart(Part):
@@ -115,7 +115,7 @@ class FacePart(Part):
         super().__init__(server, label, mesh.vertices)
         self._faces, self._own = mesh.faces, own
         self._worn: Paint | None = None
-        self._pieces: list[Piece] = []
+        self._pieces: list[ColourLayer] = []
         self._meshes = [
             server.scene.add_mesh_simple(
                 f"/{label}/colour{index}",
@@ -149,7 +149,9 @@ class FacePart(Part):
         if self._worn is paint:
             return
         self._worn = paint
-        self._pieces = [piece_of(self._faces, paint.paint == k) for k in range(len(paint.palette))]
+        self._pieces = [
+            colour_layer(self._faces, paint.paint == k) for k in range(len(paint.palette))
+        ]
         for index, mesh in enumerate(self._meshes):
             there = index < len(self._pieces) and len(self._pieces[index].faces) > 0
             mesh.visible = there

@@ -95,7 +95,7 @@ class Timeline:
             self._seek(int(beyond[0]))
 
 
-class Places:
+class FrameList:
     """A list of frames that are worth going to, each a button."""
 
     def __init__(self, server: ViserServer, title: str, pick: Pick) -> None:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from facert.cli.app import app
 from facert.demo import write_demo
-from facert.demo.takes import FILES
+from facert.demo.files import FILES
 from facert.errors import InputError, OutputExistsError
 
 RUN = CliRunner()

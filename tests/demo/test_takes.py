@@ -17,7 +17,7 @@ from facert.demo import actor_rig, character_rig, performance_take, training_tak
 from facert.demo.acting import perform
 from facert.demo.character import CONTROLS, Control, animate
 from facert.demo.expressions import ACTIVATIONS
-from facert.demo.takes import FILES
+from facert.demo.files import FILES
 from facert.errors import OutputExistsError
 from facert.io.rig import read_rig
 from facert.io.take import read_take

@@ -11,7 +11,7 @@ import pytest
 from facert.data.names import ARKIT_NAMES
 from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import Frame, frame_pattern
-from facert.live.livelink import LiveLinkEncoder
+from facert.live.livelink_packets import LiveLinkEncoder
 from facert.retarget.stream import Streamed
 
 PATIENCE = 20.0

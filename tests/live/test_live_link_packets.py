@@ -10,7 +10,7 @@ from pylivelinkface import FaceBlendShape, PyLiveLinkFace
 from facert.data.names import ARKIT_NAMES
 from facert.errors import InputError
 from facert.live.frames import BadPacketError
-from facert.live.livelink import PACKET_NAMES, LiveLinkDecoder, LiveLinkEncoder
+from facert.live.livelink_packets import PACKET_NAMES, LiveLinkDecoder, LiveLinkEncoder
 
 DECODER = LiveLinkDecoder()
 PARAMS = np.linspace(-0.2, 1.0, len(ARKIT_NAMES))

@@ -10,7 +10,7 @@ import facert
 from facert import Settings
 from facert.errors import InputError
 from facert.live.frames import Frame, frame_pattern
-from facert.live.model import LiveModel, ModelFile
+from facert.live.live_model import LiveModel, ModelFile
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from pythonosc.udp_client import SimpleUDPClient
 from facert.data.names import ARKIT_SHAPES
 from facert.live.endpoints import Address, open_receiver, open_sender
 from facert.live.frames import frame_pattern
-from facert.live.loop import Limits, Session
+from facert.live.loop import Limits, LiveSession
 from facert.retarget.stream import Streamed
 
 
@@ -30,7 +30,7 @@ def test_from_a_performer_of_one_library_to_an_engine_of_another(engine, plain):
     receiver = open_receiver(Address("vmc", "", 0), "127.0.0.1", frame_pattern(ARKIT_SHAPES))
     to = Address("livelink", "127.0.0.1", engine.getsockname()[1])
     sender = open_sender(to, ARKIT_SHAPES, receiver.counters)
-    session = Session(receiver, plain(copied), [sender])
+    session = LiveSession(receiver, plain(copied), [sender])
     with SimpleUDPClient("127.0.0.1", receiver.port) as client:
         for number in range(1, 6):
             client.send_message("/VMC/Ext/Blend/Val", ["JawOpen", number / 10])
@@ -55,8 +55,8 @@ def test_sessions_can_be_chained(receiver, phone, engine, plain):
     last = open_sender(to, names, second.counters)
     for number in range(10):
         phone.send(phone.packet(number, value=number / 10))
-    Session(receiver, plain(copied), [middle]).run(Limits(frames=10, seconds=20.0))
-    Session(second, plain(copied), [last]).run(Limits(frames=10, seconds=20.0))
+    LiveSession(receiver, plain(copied), [middle]).run(Limits(frames=10, seconds=20.0))
+    LiveSession(second, plain(copied), [last]).run(Limits(frames=10, seconds=20.0))
     stamps = []
     for number in range(10):
         _, face = PyLiveLinkFace.decode(engine.recv(2000))

@@ -6,7 +6,7 @@ import pytest
 
 from facert.errors import NumericalError
 from facert.live.frames import Counters, Frame, frame_pattern
-from facert.live.loop import CATCH_UP, PATIENCE, Limits, Session
+from facert.live.loop import CATCH_UP, PATIENCE, Limits, LiveSession
 from facert.retarget.stream import Streamed
 
 
@@ -63,7 +63,7 @@ def run(plain):
 
     def running(script, mapping=doubled, limits=Limits(), **watched):  # noqa: B008
         kept = Kept()
-        session = Session(script, plain(mapping), [kept])
+        session = LiveSession(script, plain(mapping), [kept])
         session.run(limits, **watched)
         return session, [pose for _, pose in kept.sent]
 
@@ -72,7 +72,7 @@ def run(plain):
 
 def test_every_frame_is_mapped_and_sent_with_its_time(plain):
     kept, script = Kept(), Script([0], [1], [2])
-    Session(script, plain(doubled), [kept], [kept]).run(Limits())
+    LiveSession(script, plain(doubled), [kept], [kept]).run(Limits())
     assert kept.sent == [(n / 60, 2.0 * n) for n in (0, 0, 1, 1, 2, 2)]
     assert script.counters.mapped == 3
 
@@ -171,7 +171,7 @@ class Waiting(Script):
 
 def test_between_frames_it_prepares_and_rehearses_the_last_one(plain):
     kept, mapper, script = Kept(), plain(doubled), Waiting([0], [], [1], [], [], [2, 3])
-    Session(script, mapper, [kept]).run(Limits())
+    LiveSession(script, mapper, [kept]).run(Limits())
     assert mapper.prepared == 3
     assert mapper.rehearsed == [0.0, 1 / 60, 1 / 60]
     assert kept.sent == [(n / 60, 2.0 * n) for n in range(4)]
@@ -183,7 +183,7 @@ def test_nothing_is_rehearsed_before_there_was_a_pose(plain):
         raise NumericalError("no finite pose")
 
     mapper = plain(none)
-    Session(Waiting([], [0], []), mapper, [Kept()]).run(Limits())
+    LiveSession(Waiting([], [0], []), mapper, [Kept()]).run(Limits())
     assert not mapper.rehearsed
 
 
@@ -193,13 +193,13 @@ def test_a_rehearsal_that_fails_changes_nothing(plain):
             raise NumericalError("not now")
 
     script = Waiting([0], [], [1])
-    Session(script, Shy(doubled), [Kept()]).run(Limits())
+    LiveSession(script, Shy(doubled), [Kept()]).run(Limits())
     assert (script.counters.mapped, script.counters.failed) == (2, 0)
 
 
 def test_it_waits_for_long_only_while_no_frames_come(plain):
     script = Waiting([], [0], [], [1])
-    Session(script, plain(doubled), [Kept()]).run(Limits())
+    LiveSession(script, plain(doubled), [Kept()]).run(Limits())
     assert script.waits[:2] == [PATIENCE] * 2
     assert max(script.waits[2:]) < PATIENCE
 
@@ -214,6 +214,6 @@ def test_packets_that_complete_no_frame_do_not_make_it_rehearse(plain):
             self.rehearsed += 1
 
     script = Junk([0], [1], *[[] for _ in range(500)])
-    Session(script, plain(doubled), [Kept()]).run(Limits())
+    LiveSession(script, plain(doubled), [Kept()]).run(Limits())
     assert script.counters.mapped == 2
     assert script.rehearsed < 20

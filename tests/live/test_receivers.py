@@ -10,7 +10,7 @@ from facert.data.names import ARKIT_NAMES
 from facert.errors import InputError
 from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import frame_pattern
-from facert.live.livelink import PACKET_NAMES
+from facert.live.livelink_packets import PACKET_NAMES
 from facert.live.osc import message
 from facert.live.receivers import TOLD, TakeReceiver
 

@@ -11,7 +11,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from facert.live.frames import BadPacketError, Observed
 from facert.live.osc import message, parse
-from facert.live.osc_layout import MOST_ALIKE, MOST_LENGTHS, Layouts
+from facert.live.osc_layout import MOST_ALIKE, MOST_LENGTHS, PacketTemplates
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 NAMES = ("jawOpen", "mouthSmileLeft", "Brow Up")
@@ -155,7 +155,7 @@ def test_datagrams_that_came_before_are_understood_as_at_first(shapes, order, ba
             moved = [bad * (a + shift) if isinstance(a, float) else a for a in arguments]
             messages.append(message(address, *moved))
         packet = bundle(*messages)
-        forgetful._layouts = Layouts()
+        forgetful._templates = PacketTemplates()
         results = []
         for one in (decoder, forgetful):
             try:
@@ -189,7 +189,7 @@ def test_a_performers_datagrams_are_remembered_and_a_flood_of_others_is_not():
         observed = feed(decoder, *packets)
         np.testing.assert_allclose(observed.values, POSE + time, atol=1e-6)
         assert observed.stamp == time
-    known = decoder._layouts._known
+    known = decoder._templates._known
     assert sum(map(len, known.values())) == len(packets)
     for number in range(200):
         decoder.decode(bundle(LONG, message("/x" * (number + 1), float(number))))

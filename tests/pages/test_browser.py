@@ -15,10 +15,10 @@ pytest.importorskip("viser", reason="viser is not installed")
 import facert
 from facert.data.rig import Rig
 from facert.data.take import Take
-from facert.pages.performance import Performance
+from facert.pages.view_data import Performance
 from facert.pages.pose_page import PosePage
 from facert.pages.server import address, page_server
-from facert.pages.session import Session
+from facert.pages.session import PosingSession
 from facert.pages.view_page import ViewPage
 
 DATA = Path(__file__).parents[2] / "data"
@@ -57,13 +57,13 @@ def view_page(visit, rig, recording, retargeter):
 @pytest.fixture
 def pose_page(visit, rig, recording, retargeter, tmp_path):
     bare = replace(recording, params=None)
-    session = Session(retargeter.controls, bare, retargeter, tmp_path / "take.posed.h5")
+    session = PosingSession(retargeter.controls, bare, retargeter, tmp_path / "take.posed.h5")
     with posing(visit, rig, session) as both:
         yield both
 
 
 @contextmanager
-def posing(visit, rig: Rig, session: Session) -> Iterator[tuple]:
+def posing(visit, rig: Rig, session: PosingSession) -> Iterator[tuple]:
     with page_server("take.h5", port=0) as server:
         page = PosePage(server, rig, session)
         with visit(address(server)) as seen:
@@ -99,12 +99,12 @@ def test_a_frame_is_posed_saved_and_learned_from(pose_page) -> None:
     names = page.session.controls.names
     jaw = names.index("jaw_open")
     seen.page.get_by_role("button", name="Start from neutral").click()
-    assert seen.until(lambda: not page.desk.pose.any())
-    before, pose = seen.picture(), page.desk.pose
+    assert seen.until(lambda: not page.editor.pose.any())
+    before, pose = seen.picture(), page.editor.pose
     seen.slide("jaw_open", 0.25)
-    assert seen.until(lambda: page.desk.pins.get(jaw) == pytest.approx(0.25))
+    assert seen.until(lambda: page.editor.pins.get(jaw) == pytest.approx(0.25))
     assert page.worker.finish()
-    moved = {name: page.desk.pose[index] for index, name in enumerate(names)}
+    moved = {name: page.editor.pose[index] for index, name in enumerate(names)}
     others = [name for name in names if abs(moved[name] - pose[names.index(name)]) > 0.02]
     assert len(others) > 3
     for name in others:
@@ -119,7 +119,7 @@ def test_a_frame_is_posed_saved_and_learned_from(pose_page) -> None:
     assert label.labels.tolist() == [0]
     np.testing.assert_allclose(label.params[0], list(moved.values()))
     assert seen.until(lambda: seen.page.get_by_text("Frame 0 saved").count() == 1)
-    assert not page.desk.pins
+    assert not page.editor.pins
     assert seen.errors == []
     assert seen.hosts <= {"127.0.0.1", ""}
 
@@ -129,26 +129,26 @@ def test_other_poses_are_shown_and_taken_over(pose_page) -> None:
     page.seek(5)
     page.pin(page.session.controls.names.index("smile"), 0.7)
     assert page.worker.finish()
-    followed = page.desk.pose.copy()
+    followed = page.editor.pose.copy()
     seen.page.get_by_role("button", name="Other plausible poses").click()
     seen.page.get_by_role("button", name="other 2").click()
-    assert seen.until(lambda: np.abs(page.desk.pose - followed).max() > 0.01)
-    assert page.desk.pose[page.session.controls.names.index("smile")] == 0.7
+    assert seen.until(lambda: np.abs(page.editor.pose - followed).max() > 0.01)
+    assert page.editor.pose[page.session.controls.names.index("smile")] == 0.7
     page.seek(6)
     assert page.worker.finish()
-    assert not page.desk.pins
+    assert not page.editor.pins
     page.seek(5)
     assert page.worker.finish()
-    assert list(page.desk.pins.values()) == [0.7]  # what was not saved is there again
+    assert list(page.editor.pins.values()) == [0.7]  # what was not saved is there again
     seen.page.get_by_text("smile  0.70").click()
-    assert seen.until(lambda: not page.desk.pins)
+    assert seen.until(lambda: not page.editor.pins)
     assert seen.errors == []
 
 
 def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
     """No model and no pose to begin with: what the first day looks like."""
     bare = replace(recording, params=None, animation=None)
-    session = Session(recording.controls, bare, None, tmp_path / "take.posed.h5")
+    session = PosingSession(recording.controls, bare, None, tmp_path / "take.posed.h5")
     with posing(visit, rig, session) as (page, seen):
         seen.page.get_by_role("button", name="Train on the labels").click()
         assert seen.until(lambda: seen.page.get_by_text("This did not work").count() == 1)
@@ -159,5 +159,5 @@ def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
         assert session.model_path.exists()
         page.seek(15)
         assert page.worker.finish()
-        assert np.abs(page.desk.pose - recording.params[15]).mean() < 0.2
+        assert np.abs(page.editor.pose - recording.params[15]).mean() < 0.2
         assert seen.errors == []

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from facert.data.rig import Mesh
 from facert.pages.paint import LEVELS, MOST, Scale, heat, skin
-from facert.pages.stage import piece_of
+from facert.pages.stage import colour_layer
 
 RNG = np.random.default_rng(0)
 FACES = np.array([[i, i + 1, i + 2] for i in range(60)])
@@ -65,7 +65,7 @@ def test_the_legend_escapes_the_units() -> None:
 def test_pieces_show_each_triangle_once_with_all_its_neighbours(seed: int) -> None:
     faces = np.random.default_rng(seed).integers(0, 20, (30, 3))
     chosen = np.random.default_rng(seed + 9).random(30) < 0.4
-    piece = piece_of(faces, chosen)
+    piece = colour_layer(faces, chosen)
     triangles = piece.used[piece.faces]
     whole = piece.own[piece.faces].all(axis=1)
     shown = {tuple(triangle) for triangle in triangles[whole].tolist()}
@@ -77,4 +77,4 @@ def test_pieces_show_each_triangle_once_with_all_its_neighbours(seed: int) -> No
 
 
 def test_a_piece_of_nothing_is_empty() -> None:
-    assert len(piece_of(FACES, np.zeros(len(FACES), dtype=bool)).faces) == 0
+    assert len(colour_layer(FACES, np.zeros(len(FACES), dtype=bool)).faces) == 0

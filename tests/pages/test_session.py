@@ -8,18 +8,18 @@ import facert
 from facert.data.rig import Rig
 from facert.data.take import Controls
 from facert.errors import InputError
-from facert.pages.session import Session, character_controls, output_beside
+from facert.pages.session import PosingSession, character_controls, output_beside
 
 NAMES = ["jaw", "smile", "brow", "blink"]
 
 
 @pytest.fixture
-def session(make_take, tmp_path) -> Session:
+def session(make_take, tmp_path) -> PosingSession:
     take = make_take(animation=0)
-    return Session(take.controls, take, output=tmp_path / "take.posed.h5")
+    return PosingSession(take.controls, take, output=tmp_path / "take.posed.h5")
 
 
-def free_frame(session: Session) -> int:
+def free_frame(session: PosingSession) -> int:
     return int(np.setdiff1d(np.arange(len(session.take)), session.take.labels)[0])
 
 
@@ -66,7 +66,7 @@ def test_training_tells_poses_for_all_frames_and_writes_the_model(session) -> No
 def test_what_the_first_model_knew_of_poses_is_not_lost(make_take, tmp_path) -> None:
     model = facert.train(make_take(), facert.Settings(method="gpr"))
     bare = make_take(posed=3, animation=0)
-    session = Session(model.controls, bare, model, tmp_path / "take.posed.h5")
+    session = PosingSession(model.controls, bare, model, tmp_path / "take.posed.h5")
     assert len(session.known.poses) == len(model.poses) + 3
     session.train()
     assert len(session.model.poses) == len(model.poses) + 3
@@ -75,18 +75,18 @@ def test_what_the_first_model_knew_of_poses_is_not_lost(make_take, tmp_path) -> 
 def test_predicted_poses_are_no_labels(make_take) -> None:
     take = make_take()
     model = facert.train(take, facert.Settings(method="gpr"))
-    session = Session(model.controls, model.retarget(take), model)
+    session = PosingSession(model.controls, model.retarget(take), model)
     assert not len(session.take.labels)
 
 
 def test_controls_are_matched_by_name(make_take) -> None:
     take = make_take()
     turned = Controls(NAMES[::-1])
-    session = Session(turned, take)
+    session = PosingSession(turned, take)
     frame = int(take.labels[0])
     assert session.pose(frame)[0].tolist() == take.params[frame][::-1].tolist()
     with pytest.raises(InputError, match="ear"):
-        Session(Controls(["ear", *NAMES[1:]]), take)
+        PosingSession(Controls(["ear", *NAMES[1:]]), take)
 
 
 def test_suggestions_are_frames_without_a_pose(session) -> None:
@@ -98,7 +98,7 @@ def test_suggestions_are_frames_without_a_pose(session) -> None:
 
 def test_poses_of_a_character_are_known_from_three_on(make_take, tmp_path) -> None:
     take = replace(make_take(posed=0, animation=0), controls=Controls(NAMES))
-    session = Session(take.controls, take, output=tmp_path / "a.posed.h5")
+    session = PosingSession(take.controls, take, output=tmp_path / "a.posed.h5")
     for frame in range(3):
         assert session.known is None
         session.save(frame, np.full(4, 0.1 * frame))
@@ -106,7 +106,7 @@ def test_poses_of_a_character_are_known_from_three_on(make_take, tmp_path) -> No
 
 
 def test_without_a_take_nothing_is_saved_or_learned() -> None:
-    session = Session(Controls(NAMES))
+    session = PosingSession(Controls(NAMES))
     for attempt in (lambda: session.save(0, np.zeros(4)), session.train):
         with pytest.raises(InputError, match="--take"):
             attempt()

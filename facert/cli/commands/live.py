@@ -99,8 +99,8 @@ def command(
     from facert.cli.shared.live_status import Status, print_summary
     from facert.errors import reading
     from facert.live.endpoints import File, parse_input, parse_output
-    from facert.live.loop import Limits, Session
-    from facert.live.model import LiveModel, ModelFile
+    from facert.live.loop import Limits, LiveSession
+    from facert.live.live_model import LiveModel, ModelFile
     from facert.live.recording import Recordings
 
     begin, ends = _parsed(parse_input, source), [_parsed(parse_output, one) for one in outputs]
@@ -125,7 +125,7 @@ def command(
             )
             mapper = LiveModel(file, retargeter, pattern, receiver.fps, options, neutral)
             stack.enter_context(mapper)
-        session = Session(receiver, mapper, senders, files, kept)
+        session = LiveSession(receiver, mapper, senders, files, kept)
         stopped = stack.enter_context(_stopping())
         stack.enter_context(_settled())
         stack.enter_context(_first())

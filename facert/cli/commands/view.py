@@ -14,7 +14,7 @@ from facert.errors import InputError, reading
 if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
-    from facert.pages.performance import Performance
+    from facert.pages.view_data import Performance
     from facert.render.faces import Face
     from facert.retarget.retargeter import Retargeter
 
@@ -71,7 +71,7 @@ def _performance(
     take: Take, rig: Rig | None, truth: Take | None, retargeter: Retargeter | None
 ) -> Performance:
     """The take as it is, or retargeted."""
-    from facert.pages.performance import Performance, retargeted
+    from facert.pages.view_data import Performance, retargeted
 
     if retargeter is not None:
         return retargeted(take, retargeter, rig, truth)

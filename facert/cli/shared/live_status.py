@@ -17,7 +17,7 @@ from rich.live import Live
 
 from facert.cli.shared import console
 from facert.live.frames import Counters
-from facert.live.loop import Session
+from facert.live.loop import LiveSession
 from facert.live.meter import RECENT, Pace
 
 ON_TERMINAL = 0.25
@@ -30,7 +30,7 @@ _QUIET = 2.0
 class Status:
     """Shows how the session goes, while it is entered."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: LiveSession) -> None:
         wanted = console.log.isEnabledFor(logging.INFO)
         self._session = session
         self._live = Live(console=console.err, auto_refresh=False, transient=True)
@@ -74,7 +74,7 @@ class Status:
         return f"{pace}   {_counts(counters)}"
 
 
-def print_summary(session: Session, written: Sequence[Path], as_json: bool) -> None:
+def print_summary(session: LiveSession, written: Sequence[Path], as_json: bool) -> None:
     """Say what happened, on stdout."""
     pace = session.meter.pace()
     if as_json:

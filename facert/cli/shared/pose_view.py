@@ -15,7 +15,7 @@ from facert.errors import InputError, OutputExistsError, reading
 if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
-    from facert.pages.session import Session
+    from facert.pages.session import PosingSession
     from facert.retarget.retargeter import Retargeter
 
 
@@ -58,9 +58,9 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
         console.out.print(f"{session.output}: {session.saved} poses saved", markup=False)
 
 
-def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> Session:
+def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> PosingSession:
     """The recording with its model, and where its labels go."""
-    from facert.pages.session import Session, character_controls, output_beside
+    from facert.pages.session import PosingSession, character_controls, output_beside
 
     output = files.output
     if output is None and files.take is not None:
@@ -69,7 +69,7 @@ def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> Sess
     if output is not None:
         _require_output(output, overwrite)
     with reading(files.take or files.rig or ""):
-        return Session(character_controls(model, take, rig), take, model, output)
+        return PosingSession(character_controls(model, take, rig), take, model, output)
 
 
 def _require_output(output: Path, overwrite: bool) -> None:

@@ -7,7 +7,7 @@ import facert
 from facert.data.rig import Rig
 from facert.data.take import Controls
 from facert.errors import InputError
-from facert.pages.performance import Performance, highest, retargeted
+from facert.pages.view_data import Performance, highest, retargeted
 
 NAMES = ("jaw", "smile", "brow", "blink")
 RNG = np.random.default_rng(0)

@@ -16,7 +16,7 @@ from facert.preprocess.known_poses import Given, KnownPoses
 KEPT = 32  # sets of pinned controls whose completion is kept: going back to one costs nothing
 
 
-class Desk:
+class PoseEditor:
     """A pose of which the user holds some controls.
 
     Without a pose to begin with, the others follow by `facert.posing.completion`; from one that
@@ -140,14 +140,14 @@ class Desk:
         return self._completions[key]
 
 
-def slider_bounds(desk: Desk) -> FloatArray:
+def slider_bounds(editor: PoseEditor) -> FloatArray:
     """Lowest and highest value of each control's slider, (P, 2).
 
     The declared limits; where there are none, what is known, and 0 to 1 in any case.
     """
-    limits = desk.controls.limits
-    bounds = np.tile([0.0, 1.0], (len(desk.controls.names), 1))
-    if desk.known is not None:
-        low, high = desk.known.poses.min(axis=0), desk.known.poses.max(axis=0)
+    limits = editor.controls.limits
+    bounds = np.tile([0.0, 1.0], (len(editor.controls.names), 1))
+    if editor.known is not None:
+        low, high = editor.known.poses.min(axis=0), editor.known.poses.max(axis=0)
         bounds = np.stack([np.minimum(low, 0.0), np.maximum(high, 1.0)], axis=1)
     return bounds if limits is None else np.where(np.isfinite(limits), limits, bounds)
