@@ -89,7 +89,7 @@ def _free(path: Path) -> Path:
 
 
 class SpooledRows:
-    """SpooledRows of numbers, all equally long, in a nameless file: memory does not grow with time."""
+    """Rows of equal length in a nameless file, so that memory does not grow with time."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115

@@ -14,8 +14,8 @@ from viser import Icon
 
 from facert.data.rig import Rig
 from facert.errors import InputError
-from facert.pages.pose_editor import PoseEditor, slider_bounds
 from facert.pages.playback import Playback
+from facert.pages.pose_editor import PoseEditor, slider_bounds
 from facert.pages.pose_stage import SAMPLES, PoseStage
 from facert.pages.server import complainer
 from facert.pages.session import PosingSession, Trained

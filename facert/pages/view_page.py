@@ -10,11 +10,11 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.pages.charts import Chart, most_varying
 from facert.pages.paint import Paint, Scale, skin
-from facert.pages.view_data import Performance, highest
 from facert.pages.playback import Playback
 from facert.pages.server import complainer
 from facert.pages.stage import FacePart, MarkerPart, Stage
 from facert.pages.timeline import FrameList, Timeline
+from facert.pages.view_data import Performance, highest
 from facert.pages.worker import Worker
 from facert.render.faces import Face
 

@@ -15,10 +15,10 @@ pytest.importorskip("viser", reason="viser is not installed")
 import facert
 from facert.data.rig import Rig
 from facert.data.take import Take
-from facert.pages.view_data import Performance
 from facert.pages.pose_page import PosePage
 from facert.pages.server import address, page_server
 from facert.pages.session import PosingSession
+from facert.pages.view_data import Performance
 from facert.pages.view_page import ViewPage
 
 DATA = Path(__file__).parents[2] / "data"

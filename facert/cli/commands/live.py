@@ -99,8 +99,8 @@ def command(
     from facert.cli.shared.live_status import Status, print_summary
     from facert.errors import reading
     from facert.live.endpoints import File, parse_input, parse_output
-    from facert.live.loop import Limits, LiveSession
     from facert.live.live_model import LiveModel, ModelFile
+    from facert.live.loop import Limits, LiveSession
     from facert.live.recording import Recordings
 
     begin, ends = _parsed(parse_input, source), [_parsed(parse_output, one) for one in outputs]
