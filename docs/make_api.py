@@ -28,6 +28,7 @@ OTHERS = {
     "facert.posing.pose": ("CompletedPose",),
     "facert.retarget.options": ("RetargetOptions",),
     "facert.retarget.adjustments": ("Adjustments",),
+    "facert.retarget.model": ("TrainedModel",),
     "facert.retarget.stream": ("RetargetStream", "Streamed"),
 }
 _HEADING = re.compile(r"^([A-Z]\w+)\n-{3,}\n", re.MULTILINE)

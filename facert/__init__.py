@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from facert.io.formats import write_take_file as write_take
     from facert.posing.pose import complete_pose
     from facert.posing.suggestion import suggest_frames
-    from facert.retarget.model_file import load
-    from facert.retarget.retargeter import Retargeter
+    from facert.retarget.retargeter import Retargeter, load
     from facert.retarget.training import train
     from facert.settings import Settings
 
@@ -62,7 +61,7 @@ _HOMES = {
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),
     "complete_pose": ("facert.posing.pose", "complete_pose"),
-    "load": ("facert.retarget.model_file", "load"),
+    "load": ("facert.retarget.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
     "suggest_frames": ("facert.posing.suggestion", "suggest_frames"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import get_args
+from typing import TypeVar, get_args
 
 import numpy as np
 
@@ -19,13 +19,14 @@ from facert.io.tensors import read_tensors, write_tensors
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
 from facert.regions.regional import untrained_method
-from facert.retarget.retargeter import Retargeter
+from facert.retarget.model import TrainedModel
 from facert.settings import Settings
 
 FORMAT = "facert-model"
+Model = TypeVar("Model", bound=TrainedModel)
 
 
-def save(retargeter: Retargeter, path: Path, overwrite: bool) -> None:
+def write_model(model: TrainedModel, path: Path, overwrite: bool) -> None:
     """Write everything to one safetensors file.
 
     Raises
@@ -33,44 +34,44 @@ def save(retargeter: Retargeter, path: Path, overwrite: bool) -> None:
     OutputExistsError
         When the file exists and `overwrite` is false.
     """
-    arrays = {f"method.{name}": array for name, array in retargeter.method.save().items()}
-    for view, units in (("source", retargeter.source_units), ("target", retargeter.target_units)):
+    arrays = {f"method.{name}": array for name, array in model.method.save().items()}
+    for view, units in (("source", model.source_units), ("target", model.target_units)):
         arrays[f"{view}.mean"] = units.mean
         arrays[f"{view}.scale"] = np.array([units.scale])
-    if retargeter.controls.limits is not None:
-        arrays["target.limits"] = retargeter.controls.limits
-    if retargeter.bounds is not None:
-        arrays["target.bounds"] = retargeter.bounds
-    if retargeter.poses is not None:
-        arrays["target.poses"] = retargeter.poses
-    if np.isfinite(retargeter.neutral).all():  # else an earlier version did not know it
-        arrays["source.neutral"] = retargeter.neutral
-    if retargeter.labelled is not None:
-        arrays["source.labelled"] = retargeter.labelled
-    if retargeter.motion is not None:
-        arrays |= {f"motion.{n}": array for n, array in retargeter.motion.arrays.items()}
+    if model.controls.limits is not None:
+        arrays["target.limits"] = model.controls.limits
+    if model.bounds is not None:
+        arrays["target.bounds"] = model.bounds
+    if model.poses is not None:
+        arrays["target.poses"] = model.poses
+    if np.isfinite(model.neutral).all():  # else an earlier version did not know it
+        arrays["source.neutral"] = model.neutral
+    if model.labelled is not None:
+        arrays["source.labelled"] = model.labelled
+    if model.motion is not None:
+        arrays |= {f"motion.{n}": array for n, array in model.motion.arrays.items()}
     metadata = {
         "format": FORMAT,
         "format_version": 1,
         "created_by": CREATED_BY,
         "versions": library_versions(),
-        **retargeter.facts,
+        **model.facts,
     }
     write_tensors(path, arrays, metadata, overwrite)
 
 
-def load(path: str | Path) -> Retargeter:
-    """Read a retargeter from a model file.
+def read_model(path: Path, make: type[Model]) -> Model:
+    """Read a model from its file, as a `TrainedModel` or a class that adds to it.
 
     Raises
     ------
     InputError
         When the file is missing, damaged, not a model, or does not fit together.
     """
-    if not Path(path).exists():
+    if not path.exists():
         fix = "Give the model with -m, or make it: facert train."
         raise InputError("model", "a file that train wrote", "nothing", fix, str(path))
-    arrays, metadata = read_tensors(Path(path), FORMAT)
+    arrays, metadata = read_tensors(path, FORMAT)
     with reading(path):
         try:
             settings = Settings().with_changes(metadata["settings"])
@@ -90,7 +91,7 @@ def load(path: str | Path) -> Retargeter:
         method.load(
             {n.removeprefix("method."): a for n, a in arrays.items() if n.startswith("method.")}
         )
-        retargeter = Retargeter(
+        model = make(
             method=method,
             layout=SourceLayout(kind, names),
             units=str(metadata.get("units", "")),
@@ -104,8 +105,8 @@ def load(path: str | Path) -> Retargeter:
             motion=_motion(arrays),
             labelled=arrays.get("source.labelled"),
         )
-        _check_fit(retargeter, arrays)
-    return retargeter
+        _check_fit(model, arrays)
+    return model
 
 
 def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:
@@ -125,18 +126,18 @@ def library_versions() -> dict[str, str]:
     return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
 
 
-def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None:
+def _check_fit(model: TrainedModel, arrays: Mapping[str, FloatArray]) -> None:
     """Refuse a file whose parts disagree: mapping would fail, or worse, not fail."""
-    kind, names = retargeter.source_kind, retargeter.source_names
+    kind, names = model.source_kind, model.source_names
     if kind not in get_args(SourceKind):
         raise _misfit("source_kind", "markers or weights", repr(kind))
     if len(set(names)) < len(names):
         raise _misfit("source_names", "names that are all different", "one of them twice")
-    columns = len(names) * (3 if kind == "markers" else 1), len(retargeter.controls.names)
-    _check_rows(retargeter.poses, columns[1], "target.poses")
-    _check_rows(retargeter.labelled, columns[0], "source.labelled")
+    columns = len(names) * (3 if kind == "markers" else 1), len(model.controls.names)
+    _check_rows(model.poses, columns[1], "target.poses")
+    _check_rows(model.labelled, columns[0], "source.labelled")
     for view, count, learned in zip(
-        ("source", "target"), columns, retargeter.method.dimensions, strict=True
+        ("source", "target"), columns, model.method.dimensions, strict=True
     ):
         mean, scale = arrays[f"{view}.mean"], arrays[f"{view}.scale"]
         if mean.shape != (count,):
@@ -145,10 +146,10 @@ def _check_fit(retargeter: Retargeter, arrays: Mapping[str, FloatArray]) -> None
             raise _misfit(f"{view}.observations", f"{count} columns", f"{learned}")
         if not scale.item() > 0.0:
             raise _misfit(f"{view}.scale", "a number above 0", f"{scale.item()}")
-    if retargeter.neutral.shape != columns[:1]:
-        raise _misfit("source.neutral", f"{columns[0]} numbers", f"{retargeter.neutral.shape}")
-    if retargeter.motion is not None and len(retargeter.motion.rest) != columns[0]:
-        raise _misfit("motion.rest", f"{columns[0]} numbers", f"{len(retargeter.motion.rest)}")
+    if model.neutral.shape != columns[:1]:
+        raise _misfit("source.neutral", f"{columns[0]} numbers", f"{model.neutral.shape}")
+    if model.motion is not None and len(model.motion.rest) != columns[0]:
+        raise _misfit("motion.rest", f"{columns[0]} numbers", f"{len(model.motion.rest)}")
 
 
 def _check_rows(rows: FloatArray | None, columns: int, field: str) -> None:

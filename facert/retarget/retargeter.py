@@ -10,26 +10,23 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.normalisation import Normalisation
-from facert.data.take import Controls, Source, SourceKind, Take
+from facert.data.take import Source, Take
 from facert.errors import InputError, NumericalError
-from facert.methods.base import Method
 from facert.models.threads import threads_for
 from facert.preprocess.faults import without_faults
 from facert.preprocess.motion.estimate import FEWEST, estimate_if_it_moves, grid
-from facert.preprocess.motion.motion import Motion
 from facert.preprocess.neutral import at_rest, calibrated
-from facert.preprocess.source_layout import SourceLayout
 from facert.retarget.adjustments import Adjustments
+from facert.retarget.model import TrainedModel
+from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
 from facert.retarget.options import RetargetOptions
 from facert.retarget.stream import ABSURD, RetargetStream
-from facert.settings import Settings
 
 log = logging.getLogger(__name__)
 
@@ -39,49 +36,8 @@ Mode = Literal["offline", "online"]
 
 
 @dataclass(frozen=True)
-class Retargeter:
-    """A trained method with all that mapping a take needs.
-
-    Made by `train` or `load`.
-
-    Parameters
-    ----------
-    method : Method
-        Works in normalised units.
-    layout : SourceLayout
-        What the source must hold.
-    units : str
-        Of the training take's markers; empty when unknown.
-    controls : Controls
-        What the result holds.
-    bounds : array, shape (P, 2), or None
-        What poses are clipped to.
-    source_units, target_units : Normalisation
-        To normalised units and back.
-    figures : dict
-        How training went, for people.
-    poses : array, shape (n, P), or None
-        Poses that the character is known to make, for `facert.posing`.
-    motion : Motion or None
-        How the source moves, in normalised units, for live streams.
-    neutral : array, shape (d_x,)
-        The source with the actor at rest, in its units; NaN where it is not known.
-    labelled : array, shape (l, d_x), or None
-        The source in the posed frames, gaps filled; files of earlier versions lack it.
-    """
-
-    method: Method
-    layout: SourceLayout
-    units: str
-    controls: Controls
-    bounds: FloatArray | None
-    source_units: Normalisation
-    target_units: Normalisation
-    figures: dict[str, Any]
-    neutral: FloatArray
-    poses: FloatArray | None = None
-    motion: Motion | None = None
-    labelled: FloatArray | None = None
+class Retargeter(TrainedModel):
+    """A trained model that maps takes and live sources; made by `train` or `load`."""
 
     def retarget(
         self,
@@ -144,55 +100,6 @@ class Retargeter:
         """Begin to retarget a live source; see `RetargetStream`."""
         return RetargetStream(self, names, fps, options, rest)
 
-    def finished(
-        self, Y: FloatArray, std: FloatArray | None, adjustments: Adjustments
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """Parameters and their standard deviation from normalised poses, (T, P) each."""
-        params = self.target_units.undo(Y)
-        if self.bounds is not None:
-            params = np.clip(params, *self.bounds.T)
-        spread = None if std is None else std * self.target_units.scale * np.abs(adjustments.gain)
-        return adjustments.apply(params), spread
-
-    def without_known(self, take: Take) -> Take:
-        """The take without the poses that this was trained on: what is left tells the error."""
-        if self.poses is None or take.params is None or take.controls is None:
-            return take
-        if set(take.controls.names) != set(self.controls.names):
-            return take
-        if self.figures.get("labelled frames", 0) > len(self.poses):  # not all of them are known
-            return replace(take, params=None)
-        columns = [take.controls.names.index(name) for name in self.controls.names]
-        seen = (take.params[:, None, columns] == self.poses[None]).all(axis=2).any(axis=1)
-        return replace(take, params=np.where(seen[:, None], np.nan, take.params))
-
-    @property
-    def source_kind(self) -> SourceKind:
-        """``"markers"`` or ``"weights"``."""
-        return self.layout.kind
-
-    @property
-    def source_names(self) -> tuple[str, ...]:
-        """Of the markers or weights that the model knows."""
-        return self.layout.names
-
-    @property
-    def settings(self) -> Settings:
-        """What it was trained with, defaults filled in."""
-        return self.method.settings
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """What the model holds and how it was made, as plain values."""
-        return {
-            "source_kind": self.source_kind,
-            "source_names": list(self.source_names),
-            "units": self.units,
-            "target_names": list(self.controls.names),
-            "settings": self.settings.as_dict(),
-            "figures": self.figures,
-        }
-
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write everything to one safetensors file.
 
@@ -201,9 +108,7 @@ class Retargeter:
         OutputExistsError
             When the file exists and `overwrite` is false.
         """
-        from facert.retarget.model_file import save
-
-        save(self, Path(path), overwrite)
+        write_model(self, Path(path), overwrite)
 
     def _together(self, take: Take, options: RetargetOptions) -> Take:
         """All frames at once: smoothed over time, then mapped in one batch."""
@@ -292,3 +197,14 @@ def _check_distance(frames: FloatArray) -> None:
         )
     if float(np.nanmedian(np.abs(frames))) > FAR:
         log.warning("the source lies far from the training take: check units and head motion")
+
+
+def load(path: str | Path) -> Retargeter:
+    """Read a retargeter from a model file.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged, not a model, or does not fit together.
+    """
+    return read_model(Path(path), Retargeter)

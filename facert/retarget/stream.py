@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,11 +16,8 @@ from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import FramePicker
 from facert.retarget.adjustments import Adjustments
+from facert.retarget.model import TrainedModel
 from facert.retarget.options import RetargetOptions
-
-if TYPE_CHECKING:
-    from facert.retarget.retargeter import Retargeter
-
 
 ABSURD = 1e6
 """Distance from the training take's mean, in normalised units, at which nothing can be computed."""
@@ -70,7 +66,7 @@ class RetargetStream:
 
     Parameters
     ----------
-    retargeter : Retargeter
+    model : TrainedModel
     names : sequence of str
         Of the source's markers or weights.
     fps : float, optional
@@ -88,7 +84,7 @@ class RetargetStream:
 
     def __init__(
         self,
-        retargeter: Retargeter,
+        model: TrainedModel,
         names: Sequence[str],
         fps: float | None = None,
         options: RetargetOptions | None = None,
@@ -97,23 +93,23 @@ class RetargetStream:
         options = options or RetargetOptions()
         if fps is not None and not 0.0 < fps < np.inf:
             raise InputError("fps", "a number above 0", repr(fps), "Give the true rate.")
-        places = retargeter.layout.places(names)
-        markers = retargeter.layout.kind == "markers"
-        self._retargeter = retargeter
+        places = model.layout.places(names)
+        markers = model.layout.kind == "markers"
+        self._model = model
         self._shape = (len(names), 3) if markers else (len(names),)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
         self._picker = FramePicker(places, len(names), 3 if markers else 1)
         self._watch = MarkerWatch(len(names)) if options.detect and markers else None
-        self._new_filter = partial(_filter, retargeter, fps, options)
+        self._new_filter = partial(_filter, model, fps, options)
         self._filter = self._new_filter()
         self._heard: float | None = None
         given = self._filter is None or options.sigma is not None
-        self._meter = None if given else NoiseMeter(len(retargeter.source_units.mean))
+        self._meter = None if given else NoiseMeter(len(model.source_units.mean))
         self._unheard: FloatArray | None = None
-        self._adjustments = options.adjustments or Adjustments.none(len(retargeter.controls.names))
-        self._finish = _Finish(retargeter, self._adjustments)
-        self._smooth = retargeter.method.stream()
-        self._rough = None if self._adjustments.smooth_all else retargeter.method.stream()
+        self._adjustments = options.adjustments or Adjustments.none(len(model.controls.names))
+        self._finish = _Finish(model, self._adjustments)
+        self._smooth = model.method.stream()
+        self._rough = None if self._adjustments.smooth_all else model.method.stream()
         self._calibration: Calibration | None = None
         if rest is not None:
             self.calibrate(rest)
@@ -126,7 +122,7 @@ class RetargetStream:
         rest : array, shape of a frame
             The source with the actor at rest; NaN where that is not known.
         """
-        own, model = self._picker.pick(self._checked(rest)), self._retargeter
+        own, model = self._picker.pick(self._checked(rest)), self._model
         self._calibration = Calibration.of(own, model.neutral, model.layout.kind)
         self._filter = self._new_filter()  # what it knows is where the face was
         if self._filter is not None and self._heard is not None:
@@ -161,7 +157,7 @@ class RetargetStream:
         row, seen = self._observed(values)
         if self._calibration is not None:
             row = self._calibration.apply(row)
-        frame = self._retargeter.source_units.apply(row)
+        frame = self._model.source_units.apply(row)
         if (np.abs(frame) > ABSURD).any():  # never where NaN
             expected, found = "positions near those of the training take", "others, far away"
             raise InputError("the frame", expected, found, "Skip it; check units and origin.")
@@ -206,14 +202,14 @@ class RetargetStream:
 
     def _told(self, said: Prediction) -> tuple[FloatArray | None, FloatArray]:
         """Standard deviation of the pose, and the cleaned source."""
-        source = self._retargeter.source_units.undo(said.X[0])
+        source = self._model.source_units.undo(said.X[0])
         return self._finish.spread(said.std), source.reshape(self._cleaned_shape)
 
 
 class _Finish:
-    """`Retargeter.finished` for single poses: limits, gain and limits again as one of each."""
+    """`TrainedModel.finished` for single poses: limits, gain and limits again as one of each."""
 
-    def __init__(self, model: Retargeter, adjustments: Adjustments) -> None:
+    def __init__(self, model: TrainedModel, adjustments: Adjustments) -> None:
         units, gain = model.target_units, adjustments.gain
         self._scale, self._offset = units.scale * gain, units.mean * gain
         self._spread = units.scale * np.abs(gain)
@@ -235,13 +231,13 @@ class _Finish:
 
 
 def _filter(
-    retargeter: Retargeter, fps: float | None, options: RetargetOptions
+    model: TrainedModel, fps: float | None, options: RetargetOptions
 ) -> MotionFilter | None:
     """What takes noise out, if it is wanted and the model knows how its source moves."""
-    motion = retargeter.motion
+    motion = model.motion
     if motion is None or not options.smooth:
         return None
     sigma = motion.sigma
     if options.sigma is not None:
-        sigma = options.sigma / retargeter.source_units.scale
+        sigma = options.sigma / model.source_units.scale
     return MotionFilter(motion if fps is None else motion.every(1.0 / fps), sigma)

@@ -85,7 +85,7 @@ def _cleaned(take: Take, model: Path | None, options: RetargetOptions) -> Cleane
 
     if model is None:
         return clean(take, options.sigma)
-    from facert.retarget.model_file import load
+    from facert.retarget.retargeter import load
 
     return clean_with_model(take, load(model), options)
 

@@ -37,7 +37,7 @@ def command(
 def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]:
     """What a file holds, ready for JSON."""
     if path.suffix.lower() == ".safetensors":
-        from facert.retarget.model_file import load
+        from facert.retarget.retargeter import load
 
         return {"kind": "model", **load(path).facts}
     from dataclasses import asdict

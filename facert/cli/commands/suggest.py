@@ -108,7 +108,7 @@ def _posed(take: Take, have: str) -> Sequence[int] | IntArray:
 
 
 def _model(path: str) -> Retargeter:
-    from facert.retarget.model_file import load
+    from facert.retarget.retargeter import load
 
     if not path.endswith(".safetensors"):
         raise typer.BadParameter("--have takes the word labels, or a model (.safetensors)")

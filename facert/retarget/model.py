@@ -1,0 +1,110 @@
+"""What training leaves: a method, and what it takes to bring a source to it and poses back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import Controls, SourceKind, Take
+from facert.methods.base import Method
+from facert.preprocess.motion.motion import Motion
+from facert.preprocess.source_layout import SourceLayout
+from facert.retarget.adjustments import Adjustments
+from facert.settings import Settings
+
+
+@dataclass(frozen=True)
+class TrainedModel:
+    """A trained method with all that mapping a take needs.
+
+    Parameters
+    ----------
+    method : Method
+        Works in normalised units.
+    layout : SourceLayout
+        What the source must hold.
+    units : str
+        Of the training take's markers; empty when unknown.
+    controls : Controls
+        What the result holds.
+    bounds : array, shape (P, 2), or None
+        What poses are clipped to.
+    source_units, target_units : Normalisation
+        To normalised units and back.
+    figures : dict
+        How training went, for people.
+    poses : array, shape (n, P), or None
+        Poses that the character is known to make, for `facert.posing`.
+    motion : Motion or None
+        How the source moves, in normalised units, for live streams.
+    neutral : array, shape (d_x,)
+        The source with the actor at rest, in its units; NaN where it is not known.
+    labelled : array, shape (l, d_x), or None
+        The source in the posed frames, gaps filled; files of earlier versions lack it.
+    """
+
+    method: Method
+    layout: SourceLayout
+    units: str
+    controls: Controls
+    bounds: FloatArray | None
+    source_units: Normalisation
+    target_units: Normalisation
+    figures: dict[str, Any]
+    neutral: FloatArray
+    poses: FloatArray | None = None
+    motion: Motion | None = None
+    labelled: FloatArray | None = None
+
+    def finished(
+        self, Y: FloatArray, std: FloatArray | None, adjustments: Adjustments
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Parameters and their standard deviation from normalised poses, (T, P) each."""
+        params = self.target_units.undo(Y)
+        if self.bounds is not None:
+            params = np.clip(params, *self.bounds.T)
+        spread = None if std is None else std * self.target_units.scale * np.abs(adjustments.gain)
+        return adjustments.apply(params), spread
+
+    def without_known(self, take: Take) -> Take:
+        """The take without the poses that this was trained on: what is left tells the error."""
+        if self.poses is None or take.params is None or take.controls is None:
+            return take
+        if set(take.controls.names) != set(self.controls.names):
+            return take
+        if self.figures.get("labelled frames", 0) > len(self.poses):  # not all of them are known
+            return replace(take, params=None)
+        columns = [take.controls.names.index(name) for name in self.controls.names]
+        seen = (take.params[:, None, columns] == self.poses[None]).all(axis=2).any(axis=1)
+        return replace(take, params=np.where(seen[:, None], np.nan, take.params))
+
+    @property
+    def source_kind(self) -> SourceKind:
+        """``"markers"`` or ``"weights"``."""
+        return self.layout.kind
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Of the markers or weights that the model knows."""
+        return self.layout.names
+
+    @property
+    def settings(self) -> Settings:
+        """What it was trained with, defaults filled in."""
+        return self.method.settings
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the model holds and how it was made, as plain values."""
+        return {
+            "source_kind": self.source_kind,
+            "source_names": list(self.source_names),
+            "units": self.units,
+            "target_names": list(self.controls.names),
+            "settings": self.settings.as_dict(),
+            "figures": self.figures,
+        }
