@@ -1,11 +1,15 @@
-"""Everything about a training run that a person may change, in one place."""
+"""Everything about a training run that a person may change, each described once.
+
+The options of ``facert train``, the checks of a config file, the docstring of `Settings` and the
+table in the documentation are made from the fields: another setting is another field.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Literal, get_args, get_type_hints
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from facert.data.regions import AUTO, Regions
 from facert.errors import InputError
@@ -14,11 +18,37 @@ OptimiserName = Literal["lbfgs", "scg"]
 LimitRule = Literal["auto", "declared", "none"]
 Likelihood = Literal["auto", "exact", "vfe", "fitc"]
 
-OF_SHARED = (
-    "latent_dim", "neighbours", "sigma_c", "sigma_t", "source_noise_floor", "target_noise_floor",
-    "likelihood", "inducing", "optimizer", "tolerance", "max_iterations", "checkpoint_every",
-)  # fmt: skip
-"""Settings that only the shared models use."""
+EVERYDAY, SHARED, FINE = "Settings", "Settings of the shared models", "In a config file alone"
+
+
+@dataclass(frozen=True)
+class About:
+    """What people are shown of a setting, and the least number that it may be.
+
+    Parameters
+    ----------
+    help : str
+    group : str
+        The panel of the help that lists it. Those of `SHARED` and `FINE` only the shared models
+        use; the latter are no options of ``facert train``.
+    least, above : float, optional
+        The least value, or a number that it must be above.
+    unset : str
+        What None stands for, where that is the default.
+    """
+
+    help: str
+    group: str = EVERYDAY
+    least: float | None = None
+    above: float | None = None
+    unset: str = "from the data"
+
+    def check(self, name: str, value: Any) -> None:
+        """Refuse a value out of range, with an `InputError`."""
+        if value is not None and self.least is not None and not value >= self.least:
+            raise _bad(name, f"at least {self.least}", value)
+        if value is not None and self.above is not None and not value > self.above:
+            raise _bad(name, f"a number above {self.above}", value)
 
 
 @dataclass(frozen=True)
@@ -27,110 +57,82 @@ class Settings:
 
     Lengths and noise are in normalised units: the source (and likewise the target) is centred and
     divided by the largest standard deviation of one of its dimensions.
-
-    Parameters
-    ----------
-    method : str
-        Name in the registry of methods.
-    labels : int, optional
-        Use only so many of the posed frames, drawn at random; by default all of them.
-    unlabelled : int, optional
-        Frames without a pose and poses without a frame used in training, at most so many of each,
-        drawn at random; by default as many as the method has use for: 100 for the shared Gaussian
-        process models, all for the others.
-    seed : int
-        For every random choice.
-    latent_dim : int
-        q, dimensions of the latent space.
-    neighbours : int
-        k of the reconstruction constraints, Eq. (7).
-    sigma_c : float, optional
-        Standard deviation of the measurement noise of the source, Eq. (13). It also sets the
-        noise floor of the source view. By default expected from the data, see
-        `facert.methods.noise`.
-    sigma_t : float, optional
-        Standard deviation of the change from one cleaned frame to the next, Eq. (14); used when
-        frames are mapped one after the other. By default that of the take.
-    source_noise_floor : float, optional
-        Least noise variance 1/θ3 of the source view; by default sigma_c².
-    target_noise_floor : float
-        The same for the target view: how far, squared, a posed control may be off.
-    limits : {"auto", "declared", "none"}
-        What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
-        range of all poses in the take.
-    likelihood : {"auto", "exact", "vfe", "fitc"}
-        Of the shared models: exact, or through inducing latents by the variational bound or the
-        older FITC, see `facert.models.gp.sparse`; ``"auto"`` is exact for small sets and the bound
-        for large ones.
-    inducing : int
-        Inducing latents of a view, where there are any.
-    optimizer : {"lbfgs", "scg"}
-        L-BFGS-B, or the paper's scaled conjugate gradients.
-    tolerance : float
-        Training ends when the objective falls by less than this, relative, an iteration.
-    max_iterations : int
-        Iterations at most.
-    checkpoint_every : int
-        Iterations between two checkpoints; L-BFGS begins with a new memory after each.
-    device : str
-        Where training runs: ``"cpu"`` or a torch CUDA device.
-    regions : Regions or "auto", optional
-        Parts of the face that are learned apart; ``"auto"`` finds them, see
-        `facert.regions.automatic`. By default the face is learned as a whole.
-    detect : bool
-        Take frozen, swapped and otherwise bad markers as not observed.
-    smooth : bool
-        Learn from frames without noise and gaps, as far as neighbouring frames tell.
-    neutral : str, optional
-        Frames in which the actor rests, as ``"12"`` or ``"0..20"``; by default the posed frame that
-        moves the character least.
     """
 
-    method: str = "auto"
-    labels: int | None = None
-    unlabelled: int | None = None
-    seed: int = 0
-    latent_dim: int = 8
-    neighbours: int = 8
-    sigma_c: float | None = None
-    sigma_t: float | None = None
-    source_noise_floor: float | None = None
-    target_noise_floor: float = 0.05
-    limits: LimitRule = "auto"
-    likelihood: Likelihood = "auto"
-    inducing: int = 100
-    optimizer: OptimiserName = "lbfgs"
-    tolerance: float = 1e-6
-    max_iterations: int = 2000
-    checkpoint_every: int = 500
-    device: str = "cpu"
-    regions: Regions | str | None = None
-    detect: bool = True
-    smooth: bool = True
-    neutral: str | None = None
+    method: Annotated[str, About("What learns: a name in the registry of methods.")] = "auto"
+    labels: Annotated[
+        int | None, About("Use only so many of the posed frames, at random.", least=0, unset="all")
+    ] = None
+    unlabelled: Annotated[
+        int | None,
+        About(
+            "Use so many frames without a pose, and poses without a frame, at most.",
+            least=0,
+            unset="100 for the shared models, else all",
+        ),
+    ] = None
+    seed: Annotated[int, About("For every random choice.", least=0)] = 0
+    latent_dim: Annotated[int, About("Dimensions q of the latent space.", SHARED, 1)] = 8
+    neighbours: Annotated[int, About("k of the local linear prior, Eq. (7).", SHARED, 1)] = 8
+    sigma_c: Annotated[
+        float | None, About("Standard deviation of the capture noise, Eq. (13).", SHARED, above=0)
+    ] = None
+    sigma_t: Annotated[
+        float | None,
+        About("The same of motion from frame to frame, Eq. (14), --mode online.", FINE, above=0),
+    ] = None
+    source_noise_floor: Annotated[
+        float | None, About("Least noise variance of the source.", FINE, 0, unset="sigma_c²")
+    ] = None
+    target_noise_floor: Annotated[
+        float, About("Least noise variance of the poses: how exactly they are meant.", FINE, 0)
+    ] = 0.05
+    limits: Annotated[
+        LimitRule,
+        About("Clip poses: to declared limits, else to the range of all poses (auto), or not."),
+    ] = "auto"
+    likelihood: Annotated[
+        Likelihood,
+        About("Exact for small sets, through inducing latents for large ones (auto: vfe).", FINE),
+    ] = "auto"
+    inducing: Annotated[int, About("Inducing latents of a view, if any.", FINE, 1)] = 100
+    optimizer: Annotated[
+        OptimiserName, About("L-BFGS-B, or scaled conjugate gradients (the paper's).", SHARED)
+    ] = "lbfgs"
+    tolerance: Annotated[
+        float, About("Training ends when an iteration gains less than this, relative.", FINE, 0)
+    ] = 1e-6
+    max_iterations: Annotated[int, About("Iterations at most.", FINE, 1)] = 2000
+    checkpoint_every: Annotated[
+        int, About("Iterations between checkpoints, at which L-BFGS begins anew.", FINE, 1)
+    ] = 500
+    device: Annotated[str, About("Where the shared models are trained: cpu or cuda.")] = "cpu"
+    regions: Annotated[
+        Regions | str | None,
+        About(
+            "Learn parts of the face apart: auto, or a file as facert regions prints it (in a "
+            "config file a table for each, [regions.brows]).",
+            unset="the face as a whole",
+        ),
+    ] = None
+    detect: Annotated[
+        bool, About("Take frozen, swapped and otherwise bad markers as not observed.")
+    ] = True
+    smooth: Annotated[
+        bool, About("Learn from frames without gaps and noise, as far as neighbours show.")
+    ] = True
+    neutral: Annotated[
+        str | None,
+        About("Frames in which the actor rests, as 12 or 0..20.", unset="the smallest pose"),
+    ] = None
 
     def __post_init__(self) -> None:
-        hints = get_type_hints(Settings)
-        for field in fields(self):
-            _check_type(field.name, getattr(self, field.name), hints[field.name])
-        for name in ("latent_dim", "neighbours", "inducing", "max_iterations", "checkpoint_every"):
-            self._at_least(name, 1)
-        for name in ("seed", "target_noise_floor", "tolerance"):
-            self._at_least(name, 0)
-        for name in ("labels", "unlabelled", "source_noise_floor"):
-            if getattr(self, name) is not None:
-                self._at_least(name, 0)
-        for name in ("sigma_c", "sigma_t"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise _bad(name, "a number above 0", value)
+        for name, (kind, _) in DESCRIBED.items():
+            _check_type(name, getattr(self, name), kind)
+        for name, (_, about) in DESCRIBED.items():
+            about.check(name, getattr(self, name))
         if isinstance(self.regions, str) and self.regions != AUTO:
             raise _bad("regions", f"{AUTO!r}, or a table a region", self.regions)
-
-    def _at_least(self, name: str, least: int) -> None:
-        value = getattr(self, name)
-        if not value >= least:
-            raise _bad(name, f"at least {least}", value)
 
     def with_changes(self, changes: dict[str, Any]) -> Settings:
         """These settings with the given ones replaced.
@@ -140,12 +142,10 @@ class Settings:
         InputError
             For an unknown name or a value of the wrong type.
         """
-        known = {field.name for field in fields(self)}
-        unknown = sorted(set(changes) - known)
+        unknown = sorted(changes.keys() - DESCRIBED.keys())
         if unknown:
-            raise InputError(
-                unknown[0], "one of " + ", ".join(sorted(known)), "an unknown setting", "Remove it."
-            )
+            known = ", ".join(sorted(DESCRIBED))
+            raise InputError(unknown[0], f"one of {known}", "an unknown setting", "Remove it.")
         regions = changes.get("regions")
         if isinstance(regions, Mapping):
             changes = {**changes, "regions": Regions.of(regions)}
@@ -157,13 +157,45 @@ class Settings:
         return {**asdict(self), "regions": regions}
 
 
+DESCRIBED: dict[str, tuple[Any, About]] = {
+    name: get_args(hint) for name, hint in get_type_hints(Settings, include_extras=True).items()
+}
+"""The type and the description of each setting, in the order of the fields."""
+OF_SHARED = tuple(name for name, (_, about) in DESCRIBED.items() if about.group != EVERYDAY)
+"""Settings that only the shared models use."""
+
+
+def choices(kind: Any) -> tuple[str, ...]:
+    """The words that a type allows; none where it is no literal."""
+    options = get_args(kind)
+    return options if all(isinstance(option, str) for option in options) else ()
+
+
+def default_text(name: str) -> str:
+    """The default of a setting, or what it stands for."""
+    default = getattr(DEFAULTS, name)
+    return DESCRIBED[name][1].unset if default is None else str(default)
+
+
+def _parameters() -> str:
+    """The settings as a section of a docstring."""
+    lines = ["Parameters", "----------"]
+    for name, (kind, about) in DESCRIBED.items():
+        words = ", ".join(f'"{word}"' for word in choices(kind))
+        plain = getattr(kind, "__name__", str(kind).rpartition(".")[2])
+        types = f"{{{words}}}" if words else plain.replace(" | None", ", optional")
+        unset = f" By default {about.unset}." if getattr(DEFAULTS, name) is None else ""
+        lines += [f"{name} : {types}", f"    {about.help}{unset}"]
+    return "\n    ".join(lines)
+
+
 def _check_type(name: str, value: object, hint: Any) -> None:
-    options = get_args(hint)
-    if options and all(isinstance(option, str) for option in options):  # Literal
-        if value not in options:
-            raise _bad(name, "one of " + ", ".join(options), value)
+    words = choices(hint)
+    if words:
+        if value not in words:
+            raise _bad(name, "one of " + ", ".join(words), value)
         return
-    allowed = options or (hint,)
+    allowed = get_args(hint) or (hint,)
     if float in allowed:
         allowed = (*allowed, int)
     if isinstance(value, bool) != (bool in allowed) or not isinstance(value, allowed):
@@ -175,3 +207,7 @@ def _check_type(name: str, value: object, hint: Any) -> None:
 
 def _bad(name: str, expected: str, value: object) -> InputError:
     return InputError(name, expected, repr(value), "Change the setting.")
+
+
+DEFAULTS = Settings()
+Settings.__doc__ = f"{Settings.__doc__}\n    {_parameters()}"

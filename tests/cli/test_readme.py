@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 from pathlib import Path
@@ -45,26 +44,6 @@ def test_every_command_is_in_the_table(facert):
     offered = set(re.findall(r"^│ ([a-z][\w-]*) ", facert("--help").out, re.MULTILINE))
 
     assert listed == offered
-
-
-def test_settings_table_shows_the_defaults():
-    from facert.settings import Settings
-
-    settings = Settings().as_dict()
-    rows = dict(re.findall(r"^\| (`[\w`, ]+`) \| ([^|]+) \|", README, re.MULTILINE))
-    names = [name for row in rows for name in re.findall(r"`(\w+)`", row) if name in settings]
-
-    assert sorted(names) == sorted(settings)
-    for row, shown in rows.items():
-        values = [part.strip().strip("`") for part in shown.split(",")]
-        for name, value in zip(re.findall(r"`(\w+)`", row), values, strict=False):
-            default = settings.get(name)
-            if default is None:
-                continue
-            if isinstance(default, (str, bool)):
-                assert value == json.dumps(default)
-            else:
-                assert float(value) == default
 
 
 def test_every_method_is_in_the_table():
