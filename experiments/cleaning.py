@@ -25,7 +25,7 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert.data.arrays import BoolArray, FloatArray, rms
 from facert.data.normalisation import Normalisation
-from facert.preprocess.gaps import Gaussian
+from facert.models.gaussian import Gaussian
 from facert.preprocess.motion.estimate import estimate
 from facert.preprocess.motion.interpolation import interpolated
 from facert.preprocess.motion.noise import capture_noise

@@ -15,7 +15,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.methods.base import Prediction
-from facert.preprocess.gaps import Gaussian
+from facert.models.gaussian import Gaussian
 
 if TYPE_CHECKING:
     from facert.methods.regression import Map

@@ -22,9 +22,9 @@ from facert.errors import InputError
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.models.device import find_device
+from facert.models.gaussian import Gaussian
 from facert.models.optim.monitor import Monitor
 from facert.models.threads import threads_for
-from facert.preprocess.gaps import Gaussian
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ class Regression(ABC):
     What a frame does not show is filled in first, by what all training frames tell of how the
     source's dimensions go together; the cleaned source of a prediction is the filled one. What the
     fill leaves open adds to the variance of a pose, as it would with the best linear stand-in for
-    the map, y = const + x B: see `facert.preprocess.gaps.Gaussian.fill_for`.
+    the map, y = const + x B: see `facert.models.gaussian.Gaussian.fill_for`.
 
     Parameters
     ----------

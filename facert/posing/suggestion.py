@@ -22,9 +22,9 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind, Take
 from facert.errors import InputError
+from facert.models.gaussian import fill_gaps
 from facert.models.whitening import whitening
 from facert.posing.medoids import LEAST_GAIN, Choice
-from facert.preprocess.gaps import fill_gaps
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.retargeter import Retargeter
 

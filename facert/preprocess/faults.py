@@ -24,8 +24,8 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.take import Source, Take
+from facert.models.gaussian import Gaussian
 from facert.preprocess.cache import remembered
-from facert.preprocess.gaps import Gaussian
 from facert.preprocess.motion.interpolation import interpolated
 
 log = logging.getLogger(__name__)

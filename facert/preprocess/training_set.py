@@ -10,7 +10,7 @@ import numpy as np
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.preprocess.gaps import Gaussian
+from facert.models.gaussian import Gaussian
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)

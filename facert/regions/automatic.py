@@ -20,7 +20,7 @@ from facert.data.names import control_groups
 from facert.data.regions import Region, Regions
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.preprocess.gaps import fill_gaps
+from facert.models.gaussian import fill_gaps
 from facert.regions.bipartition import two_groups
 from facert.regions.label_errors import left_out_errors
 

@@ -13,7 +13,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.preprocess.gaps import fill_gaps
+from facert.models.gaussian import fill_gaps
 from facert.topology.labels import checked_labels
 from facert.topology.placement import (
     Fit,

@@ -12,7 +12,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.preprocess.gaps import fill_gaps
+from facert.models.gaussian import fill_gaps
 from facert.settings import LimitRule
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate

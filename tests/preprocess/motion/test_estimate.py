@@ -4,7 +4,7 @@ from scipy.linalg import block_diag
 
 from facert.errors import InputError
 from facert.io.formats import read_take_file
-from facert.preprocess.gaps import fill_gaps
+from facert.models.gaussian import fill_gaps
 from facert.preprocess.motion import smoothing
 from facert.preprocess.motion.estimate import (
     LONGEST,

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from facert.preprocess import gaps
-from facert.preprocess.gaps import Gaussian, fill_gaps
+from facert.models import gaussian as model
+from facert.models.gaussian import Gaussian, fill_gaps
 
 
 def rows(n=300, d=9, rank=3, noise=0.0, seed=0):
@@ -59,9 +59,9 @@ def conditional_mean(gaussian, row):
     return gaussian.mean[h] + gaussian.covariance[np.ix_(h, ~h)] @ gain
 
 
-@pytest.mark.parametrize("chunk", [1, 500, gaps.CHUNK])
+@pytest.mark.parametrize("chunk", [1, 500, model.CHUNK])
 def test_new_frames_are_filled_by_the_conditional_mean_whatever_each_hides(chunk, monkeypatch):
-    monkeypatch.setattr(gaps, "CHUNK", chunk)
+    monkeypatch.setattr(model, "CHUNK", chunk)
     gaussian = Gaussian.of(rows(noise=0.1))
     X, _ = with_gaps(rows(n=50, noise=0.1, seed=2), 0.4)
     X[7], X[8] = np.nan, 0.0
@@ -87,11 +87,11 @@ def test_fitted_through_gaps_a_gaussian_keeps_the_variance_that_filling_takes_aw
     assert abs(fitted - whole) < 0.3 * abs(plain - whole)
 
 
-@pytest.mark.parametrize("chunk", [1, 500, gaps.CHUNK])
+@pytest.mark.parametrize("chunk", [1, 500, model.CHUNK])
 def test_what_a_fill_leaves_open_of_a_linear_function_is_its_conditional_variance(
     chunk, monkeypatch
 ):
-    monkeypatch.setattr(gaps, "CHUNK", chunk)
+    monkeypatch.setattr(model, "CHUNK", chunk)
     gaussian = Gaussian.of(rows(noise=0.1))
     X, _ = with_gaps(rows(n=50, noise=0.1, seed=2), 0.4)
     X[7], X[8] = np.nan, 0.0

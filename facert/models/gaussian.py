@@ -1,4 +1,4 @@
-"""Filling what was not observed in a set of frames from what was."""
+"""The Gaussian of frames, and imputation: the conditional mean of hidden values given seen ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def fill_gaps(X: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Gaussian:
-    """The distribution of frames, which tells what a frame hides from what it shows.
+    """A Gaussian distribution of frames.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Gaussian:
 
     @classmethod
     def of(cls, X: FloatArray) -> Gaussian:
-        """Fitted to frames (n, d); NaN: not observed. Every column has at least one observation.
+        """The Gaussian fitted to frames (n, d); NaN: not observed, but once in each column.
 
         A few steps of expectation maximisation (Little and Rubin 2002, section 11.2): fill,
         estimate mean and covariance (with the fill's own covariance added), fill again.
@@ -58,7 +58,7 @@ class Gaussian:
             return cls._of_complete(X)
         found = cls._of_complete(np.where(hidden, np.nanmean(X, axis=0), X))
         for _ in range(ITERATIONS):
-            found = cls._of_complete(found.fill(X), found._doubt(hidden))
+            found = cls._of_complete(found.fill(X), found._summed_covariance(hidden))
         return found
 
     @classmethod
@@ -89,7 +89,7 @@ class Gaussian:
         return filled
 
     def fill_for(self, X: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Fill frames, and tell how uncertain that leaves x B, a linear function of a frame.
+        """Fill frames, with the variance that this leaves in x B, a linear function of a frame.
 
         Where h is hidden and s is seen,
 
@@ -116,9 +116,9 @@ class Gaussian:
         variance = np.zeros((len(X), B.shape[1]))
         if not hidden.any():
             return X, variance
-        pull = _with_nothing(np.where(hidden, 0.0, X - self.mean) @ self.precision)
-        filled = _with_nothing(np.where(hidden, self.mean, X))
-        P, B = self._precision_with_nothing, np.vstack([B, np.zeros(B.shape[1])])
+        pull = _padded(np.where(hidden, 0.0, X - self.mean) @ self.precision)
+        filled = _padded(np.where(hidden, self.mean, X))
+        P, B = self._padded_precision, np.vstack([B, np.zeros(B.shape[1])])
         for rows, columns in _batches(hidden, B.shape[1]):
             sides = np.concatenate([pull[rows[:, None], columns][:, :, None], B[columns]], axis=2)
             solved = np.linalg.solve(_blocks(P, columns), sides)
@@ -127,9 +127,9 @@ class Gaussian:
             variance[rows] = np.maximum(spread, 0.0)  # rounding may take it below
         return filled[:, : X.shape[1]].copy(), variance
 
-    def _doubt(self, hidden: BoolArray) -> FloatArray:
+    def _summed_covariance(self, hidden: BoolArray) -> FloatArray:
         """The conditional covariances P_hh⁻¹ of all frames, summed, (d, d)."""
-        d, P = len(self.covariance), self._precision_with_nothing
+        d, P = len(self.covariance), self._padded_precision
         total = np.zeros(P.size)
         for _, columns in _batches(hidden):
             places = columns[:, :, None] * len(P) + columns[:, None, :]
@@ -138,17 +138,17 @@ class Gaussian:
         return total.reshape(P.shape)[:d, :d]
 
     @cached_property
-    def _precision_with_nothing(self) -> FloatArray:
-        """P with the row and column of nothing, (d + 1, d + 1), see `_batches`."""
+    def _padded_precision(self) -> FloatArray:
+        """P with a row and a column of zeros, (d + 1, d + 1), see `_batches`."""
         return np.pad(self.precision, (0, 1))
 
 
 def _batches(hidden: BoolArray, width: int = 0) -> Iterator[tuple[IntArray, IntArray]]:
-    """The frames that hide anything, (n, d), those that hide most first, some at once.
+    """Batches of the frames (n, d) that hide anything, those that hide most first.
 
     Each batch is the rows of its frames, (b,), and the columns that each of them hides, (b, h). A
-    frame that hides fewer than h is filled up with column d, which stands for nothing. Batches
-    are cut so that (h, h) and (h, width) numbers can be kept for each of their frames.
+    frame that hides fewer than h is filled up with d, the index of a padding column. Batches are
+    cut so that (h, h) and (h, width) numbers can be kept for each of their frames.
     """
     d = hidden.shape[1]
     counts = hidden.sum(axis=1)
@@ -163,13 +163,13 @@ def _batches(hidden: BoolArray, width: int = 0) -> Iterator[tuple[IntArray, IntA
         first += len(rows)
 
 
-def _with_nothing(X: FloatArray) -> FloatArray:
-    """X (n, d) with the column of nothing beside it, (n, d + 1), see `_batches`."""
+def _padded(X: FloatArray) -> FloatArray:
+    """X (n, d) with a column of zeros beside it, (n, d + 1), see `_batches`."""
     return np.hstack([X, np.zeros((len(X), 1))])  # np.pad takes ten times as long
 
 
 def _blocks(P: FloatArray, columns: IntArray) -> FloatArray:
-    """P_hh of each frame, (b, h, h), with the identity where columns (b, h) stand for nothing."""
+    """P_hh of each frame, (b, h, h), with the identity where columns (b, h) are padding."""
     blocks = P.ravel().take(columns[:, :, None] * len(P) + columns[:, None, :])
     np.einsum("bhh->bh", blocks)[...] += columns == len(P) - 1  # einsum: a view of the diagonals
     return blocks
