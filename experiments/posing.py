@@ -31,7 +31,7 @@ from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.normalisation import Normalisation
 from facert.data.take import Source
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
-from facert.models.gp.regression import maximise_likelihood
+from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.posing.completion import Completion
 from facert.posing.pose import complete_pose

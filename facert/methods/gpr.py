@@ -17,13 +17,13 @@ from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.regression import Map, SupervisedRegression
-from facert.models.gp.jitter import whitener
-from facert.models.gp.regression import (
+from facert.models.gp.hyperparameters import (
     LINEAR_BOUNDS,
     NO_LINEAR_TERM,
-    RegressionKernel,
     maximise_likelihood,
 )
+from facert.models.gp.jitter import whitener
+from facert.models.kernels import RegressionKernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ProcessMap(Map):
     X, Y : arrays, shapes (n, d_x) and (n, d_y)
         Training frames and poses, with mean zero.
     theta : array, shape (4,)
-        θ1, θ2, θ3 and θ4 of `facert.models.gp.regression`; θ1 or θ4 may be 0.
+        θ1, θ2, θ3 and θ4 of `facert.models.gp.hyperparameters`; θ1 or θ4 may be 0.
     """
 
     axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "theta": "4"}

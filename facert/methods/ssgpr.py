@@ -22,7 +22,7 @@ from facert.methods.gpr import ProcessMap
 from facert.methods.one_frame import ShrunkFrame
 from facert.methods.regression import Map, Regression
 from facert.methods.shrinkage import Shrinkage
-from facert.models.gp.regression import maximise_likelihood
+from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening

@@ -1,6 +1,15 @@
-"""The squared exponential kernel with noise, Eq. (3) of Bouaziz and Pauly (2014).
+"""The kernels, Eq. (3) of Bouaziz and Pauly (2014), with their derivatives by squared distance.
 
-    k(z_i, z_j) = θ1 exp(-θ2/2 |z_i - z_j|²) + θ3⁻¹ δ_ij
+    K_ij = k(s_ij) + θ3⁻¹ δ_ij,      s_ij = |z_i - z_j|²,      k(s) = θ1 φ(θ2 s),
+
+where the paper's φ(u) = exp(-u/2). Whatever needs a kernel needs no more of it than k and its
+derivatives k' = dk/ds and k'' = d²k/ds²:
+
+    ∂k/∂z      = 2 k' (z - z_i),
+    ∂²k/∂z²    = 2 k' I + 4 k'' (z - z_i)(z - z_i)ᵀ,
+    ∂k/∂log θ1 = k,      ∂k/∂log θ2 = k' s.
+
+To add a kernel, write a class with these three functions and name it in `KERNELS`.
 
 The noise variance θ3⁻¹ has a floor, a prior on the noise of the observations: without one the
 likelihood of a noise-free capture drives it to zero, σ_p² of Eq. (17) vanishes at the training
@@ -9,19 +18,32 @@ latents, and source mapping is pulled onto them.
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.errors import InputError
+
+if TYPE_CHECKING:  # importing it takes seconds, and most methods do without
+    from torch import Tensor
 
 INITIAL_THETA = (1.0, 1.0, 100.0)  # the paper's {θ1, θ2, θ3}
 LEAST_EXCESS = 1e-3  # noise above the floor where a search begins, relative to the floor
 
+Array = TypeVar("Array", FloatArray, "Tensor")
+
 
 @dataclass(frozen=True)
-class Kernel:
+class Kernel(ABC):
     """A kernel with fixed parameters.
+
+    Its functions take arrays and tensors of any shape.
 
     Parameters
     ----------
@@ -37,11 +59,23 @@ class Kernel:
     inverse_width: float
     noise: float
 
+    @abstractmethod
+    def value(self, squared: Array) -> Array:
+        """k(s), without the noise, at squared distances s >= 0."""
+
+    @abstractmethod
+    def slope(self, squared: Array, k: Array) -> Array:
+        """dk/ds, from k(s), which it is proportional to: a weighted k gives the weighted slope."""
+
+    @abstractmethod
+    def curvature(self, squared: Array, k: Array) -> Array:
+        """d²k/ds², from k(s) in the same manner."""
+
     @classmethod
-    def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Kernel:
+    def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Self:
         """From (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
-        variance, inverse_width, excess = np.exp(log_kernel)
-        return cls(float(variance), float(inverse_width), float(excess) + noise_floor)
+        variance, inverse_width, excess = np.exp(log_kernel).tolist()
+        return cls(variance, inverse_width, excess + noise_floor)
 
     def to_log(self, noise_floor: float) -> FloatArray:
         """The inverse of `from_log`.
@@ -57,23 +91,121 @@ class Kernel:
         return self.variance, self.inverse_width, 1.0 / self.noise
 
     def cross(self, Z: FloatArray, Z_train: FloatArray) -> FloatArray:
-        """θ1 exp(-θ2/2 |z_i - z_j|²) between two sets, (n, q) and (N, q), giving (n, N)."""
-        squared = (
-            np.sum(Z * Z, axis=1)[:, None]
-            + np.sum(Z_train * Z_train, axis=1)
-            - 2.0 * (Z @ Z_train.T)
-        )
-        k: FloatArray = self.variance * np.exp(-0.5 * self.inverse_width * np.maximum(squared, 0.0))
-        return k
+        """The kernel without noise between two sets, (n, q) and (N, q), giving (n, N)."""
+        squared = np.sum(Z * Z, axis=1)[:, None] + np.sum(Z_train * Z_train, axis=1)
+        squared -= 2.0 * (Z @ Z_train.T)
+        return self.value(np.maximum(squared, 0.0, out=squared))
+
+    def prior_variance(self, Z: FloatArray) -> FloatArray:
+        """The kernel without noise of each row with itself, (n,)."""
+        return np.full(len(Z), self.variance)
 
     def gram(self, Z: FloatArray) -> FloatArray:
         """The training matrix K, (N, N), noise included."""
         K = self.cross(Z, Z)
-        K[np.diag_indices_from(K)] = self.variance + self.noise
+        K[np.diag_indices_from(K)] = self.prior_variance(Z) + self.noise
         return K
+
+
+def squared_exponential(squared: Array, variance: Any, inverse_width: Any) -> Array:
+    """θ1 exp(-θ2/2 s), Eq. (3); the parameters are numbers, or arrays that broadcast."""
+    k: Array = _exp(squared * (-0.5 * inverse_width)) * variance
+    return k
+
+
+@dataclass(frozen=True)
+class SquaredExponential(Kernel):
+    """The paper's kernel: k(s) = θ1 exp(-θ2/2 s)."""
+
+    def value(self, squared: Array) -> Array:
+        """k(s)."""
+        return squared_exponential(squared, self.variance, self.inverse_width)
+
+    def slope(self, squared: Array, k: Array) -> Array:  # noqa: ARG002  k tells all
+        """The slope, -θ2/2 k."""
+        return k * (-0.5 * self.inverse_width)
+
+    def curvature(self, squared: Array, k: Array) -> Array:  # noqa: ARG002
+        """The curvature, θ2²/4 k."""
+        return k * (0.25 * self.inverse_width**2)
+
+
+@dataclass(frozen=True)
+class Matern52(Kernel):
+    """The Matérn kernel of a process that is twice differentiable (Rasmussen and Williams, 4.17).
+
+    k(s) = θ1 p(a) exp(-a), where a = √(5 θ2 s) and p(a) = 1 + a + a²/3.
+    """
+
+    def value(self, squared: Array) -> Array:
+        """k(s)."""
+        a, p = self._polynomial(squared)
+        return p * _exp(-a) * self.variance
+
+    def slope(self, squared: Array, k: Array) -> Array:
+        """The slope, -5/6 θ2 (1 + a)/p(a) k."""
+        a, p = self._polynomial(squared)
+        return k * (a + 1.0) / p * (-5.0 / 6.0 * self.inverse_width)
+
+    def curvature(self, squared: Array, k: Array) -> Array:
+        """The curvature, 25/12 θ2²/p(a) k."""
+        _, p = self._polynomial(squared)
+        return k / p * (25.0 / 12.0 * self.inverse_width**2)
+
+    def _polynomial(self, squared: Array) -> tuple[Array, Array]:
+        a = squared**0.5 * math.sqrt(5.0 * self.inverse_width)
+        return a, a * (a / 3.0 + 1.0) + 1.0
+
+
+@dataclass(frozen=True)
+class RegressionKernel(SquaredExponential):
+    """The squared exponential with a linear term: k(x, x') = θ1 exp(-θ2/2 |x - x'|²) + θ4 xᵀx'.
+
+    Parameters
+    ----------
+    linear : float
+        θ4.
+    """
+
+    linear: float = 0.0
+
+    def cross(self, Z: FloatArray, Z_train: FloatArray) -> FloatArray:
+        """The kernel without noise between two sets, (n, q) and (N, q), giving (n, N)."""
+        return super().cross(Z, Z_train) + self.linear * (Z @ Z_train.T)
+
+    def prior_variance(self, Z: FloatArray) -> FloatArray:
+        """The kernel without noise of each row with itself, (n,)."""
+        squares: FloatArray = np.einsum("nq,nq->n", Z, Z)
+        return super().prior_variance(Z) + self.linear * squares
+
+
+KERNELS: Mapping[str, type[Kernel]] = MappingProxyType(
+    {"squared-exponential": SquaredExponential, "matern-5/2": Matern52}
+)
+
+
+def kernel_class(name: str, field: str) -> type[Kernel]:
+    """The kernel of that name; raises InputError, which names the field, when there is none."""
+    if name not in KERNELS:
+        raise InputError(
+            field,
+            "one of " + ", ".join(KERNELS),
+            repr(name),
+            "Choose one of these; for a model file, install the facert that wrote it.",
+        )
+    return KERNELS[name]
 
 
 def initial_log_kernel() -> FloatArray:
     """Log parameters that give the paper's initial {1, 1, 100}, with the floor beside it."""
     theta1, theta2, theta3 = INITIAL_THETA
     return np.log([theta1, theta2, 1.0 / theta3])
+
+
+def _exp(x: Array) -> Array:
+    """The exponential, in place."""
+    if isinstance(x, np.ndarray):
+        np.exp(x, out=x)
+    else:
+        x.exp_()
+    return x

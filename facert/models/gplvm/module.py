@@ -12,7 +12,7 @@ from facert.models.gp.likelihood import compact_factor, negative_log_likelihood
 from facert.models.gp.posterior import Posterior, Predictor
 from facert.models.gplvm.energy import View, energy
 from facert.models.gplvm.prior import half_square, latent_precision
-from facert.models.kernels import Kernel, initial_log_kernel
+from facert.models.kernels import Kernel, SquaredExponential, initial_log_kernel
 
 
 class SharedGPLVM(nn.Module):
@@ -122,12 +122,16 @@ class SharedGPLVM(nn.Module):
     @property
     def kernel_x(self) -> Kernel:
         """The source view's kernel with its present parameters."""
-        return Kernel.from_log(self.log_kernel_x.detach().cpu().numpy(), self.noise_floor_x)
+        return SquaredExponential.from_log(
+            self.log_kernel_x.detach().cpu().numpy(), self.noise_floor_x
+        )
 
     @property
     def kernel_y(self) -> Kernel:
         """The target view's kernel with its present parameters."""
-        return Kernel.from_log(self.log_kernel_y.detach().cpu().numpy(), self.noise_floor_y)
+        return SquaredExponential.from_log(
+            self.log_kernel_y.detach().cpu().numpy(), self.noise_floor_y
+        )
 
     @property
     def latents_x(self) -> FloatArray:

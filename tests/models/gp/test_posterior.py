@@ -4,9 +4,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from facert.models.gp.posterior import Posterior
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
-KERNEL = Kernel(variance=1.4, inverse_width=0.5, noise=0.05)
+KERNEL = SquaredExponential(variance=1.4, inverse_width=0.5, noise=0.05)
 STEP = 1e-6
 
 
@@ -74,7 +74,7 @@ def test_solve_divides_by_the_training_matrix(posterior, z):
 
 def test_with_little_noise_the_variance_keeps_its_digits(posterior):
     """At a training position σ² = noise (2 - noise (K⁻¹)_ii), however small the noise."""
-    kernel = Kernel(variance=1.0, inverse_width=0.5, noise=1e-7)
+    kernel = SquaredExponential(variance=1.0, inverse_width=0.5, noise=1e-7)
     Z = posterior.Z
     precision = np.diag(np.linalg.inv(kernel.gram(Z).astype(np.longdouble).astype(float)))
     expected = kernel.noise * (2.0 - kernel.noise * precision)

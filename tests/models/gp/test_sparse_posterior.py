@@ -4,9 +4,9 @@ import pytest
 from facert.models.gp.posterior import Posterior
 from facert.models.gp.sparse import APPROXIMATIONS
 from facert.models.gp.sparse_posterior import sparse_posterior
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
-KERNEL = Kernel(variance=1.4, inverse_width=0.5, noise=0.05)
+KERNEL = SquaredExponential(variance=1.4, inverse_width=0.5, noise=0.05)
 
 every_approximation = pytest.mark.parametrize("approximation", APPROXIMATIONS)
 

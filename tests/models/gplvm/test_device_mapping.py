@@ -13,7 +13,7 @@ from facert.models.gplvm.device_mapping import (
 )
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.models.gplvm.target_mapping import map_to_target
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
 DEVICES = [
     "cpu",
@@ -26,7 +26,9 @@ DEVICES = [
 def make_view(columns, noise, seed):
     rng = np.random.default_rng(seed)
     Z = np.random.default_rng(0).normal(size=(30, 3))
-    return Posterior(Z, np.sin(Z @ rng.normal(size=(3, columns))), Kernel(1.3, 0.4, noise))
+    return Posterior(
+        Z, np.sin(Z @ rng.normal(size=(3, columns))), SquaredExponential(1.3, 0.4, noise)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ import pytest
 
 from facert.models.gp.posterior import Posterior
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
-KERNEL = Kernel(variance=1.2, inverse_width=0.5, noise=0.02)
+KERNEL = SquaredExponential(variance=1.2, inverse_width=0.5, noise=0.02)
 LATENT, COLUMNS = 3, 9
 
 

@@ -4,9 +4,9 @@ from scipy.optimize import minimize
 
 from facert.models.gp.posterior import Posterior
 from facert.models.gplvm.source_mapping import CHUNK, Observation, SourceMapping
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
-KERNEL = Kernel(variance=1.2, inverse_width=0.5, noise=0.02)
+KERNEL = SquaredExponential(variance=1.2, inverse_width=0.5, noise=0.02)
 SIGMA_C, SIGMA_T = 0.1, 0.2
 STEP = 1e-5
 

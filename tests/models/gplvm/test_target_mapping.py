@@ -4,9 +4,9 @@ import pytest
 from facert.models.gp.posterior import Posterior
 from facert.models.gplvm.source_mapping import CHUNK, Mapped
 from facert.models.gplvm.target_mapping import map_to_target
-from facert.models.kernels import Kernel
+from facert.models.kernels import SquaredExponential
 
-KERNEL = Kernel(variance=1.0, inverse_width=0.5, noise=0.05)
+KERNEL = SquaredExponential(variance=1.0, inverse_width=0.5, noise=0.05)
 
 
 @pytest.fixture

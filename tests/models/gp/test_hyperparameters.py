@@ -7,12 +7,12 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
 
-from facert.models.gp.regression import (
+from facert.models.gp.hyperparameters import (
     NO_LINEAR_TERM,
-    RegressionKernel,
     _Profile,
     maximise_likelihood,
 )
+from facert.models.kernels import RegressionKernel
 
 
 def data(n=25, q=12, d=5, noise=0.1, seed=0):

@@ -33,7 +33,7 @@ from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
-from facert.models.kernels import Kernel
+from facert.models.kernels import RegressionKernel, squared_exponential
 
 # Of (log w, log ν, log λ). The widest kernel is as good as linear, the narrowest as good as noise.
 WIDTH_BOUNDS = (math.log(1e-6), math.log(1e3))
@@ -43,34 +43,6 @@ NO_LINEAR_TERM = (-1e3, -1e3)  # e to this power is 0 exactly
 LEAST_SCALE = 1e-20  # in case Y is zero throughout
 # Every combination is a start of the search.
 STARTS = ((math.log(0.03), math.log(0.3), math.log(3.0)), (math.log(1e-5), math.log(1e-2)), (0.0,))
-
-
-@dataclass(frozen=True)
-class RegressionKernel(Kernel):
-    """The squared exponential with noise and a linear term.
-
-    Parameters
-    ----------
-    linear : float
-        θ4.
-    """
-
-    linear: float = 0.0
-
-    def cross(self, Z: FloatArray, Z_train: FloatArray) -> FloatArray:
-        """The kernel without noise between two sets, (n, q) and (N, q), giving (n, N)."""
-        return super().cross(Z, Z_train) + self.linear * (Z @ Z_train.T)
-
-    def prior_variance(self, Z: FloatArray) -> FloatArray:
-        """The kernel without noise of each row with itself, (n,)."""
-        k: FloatArray = self.variance + self.linear * np.einsum("nq,nq->n", Z, Z)
-        return k
-
-    def gram(self, Z: FloatArray) -> FloatArray:
-        """The training matrix K, (N, N), noise included."""
-        K = self.cross(Z, Z)
-        K[np.diag_indices_from(K)] = self.prior_variance(Z) + self.noise
-        return K
 
 
 @dataclass(frozen=True)
@@ -126,7 +98,7 @@ class _Profile:
 
     def __call__(self, v: FloatArray) -> tuple[float, FloatArray]:
         w, nu, lam = np.exp(v)
-        C = np.exp(-0.5 * w * self.D)
+        C = squared_exponential(self.D, 1.0, w)
         R_inverse, log_determinant = self._inverse(C, nu, lam)
         A = R_inverse @ self.Y
         n, d = self.Y.shape
@@ -144,7 +116,7 @@ class _Profile:
     def kernel(self, v: FloatArray) -> RegressionKernel:
         """In the units of the data, with the best scale."""
         w, nu, lam = np.exp(v).tolist()
-        R_inverse, _ = self._inverse(np.exp(-0.5 * w * self.D), nu, lam)
+        R_inverse, _ = self._inverse(squared_exponential(self.D, 1.0, w), nu, lam)
         s = self._scale(R_inverse @ self.Y)
         return RegressionKernel(
             variance=s / (1.0 + lam),

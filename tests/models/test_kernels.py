@@ -1,0 +1,113 @@
+"""Every kernel of the registry, and the paper's against another library's."""
+
+import numpy as np
+import pytest
+import torch
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
+
+from facert.errors import InputError
+from facert.models.kernels import (
+    KERNELS,
+    RegressionKernel,
+    SquaredExponential,
+    initial_log_kernel,
+    kernel_class,
+)
+
+THETA = {"variance": 1.7, "inverse_width": 0.6, "noise": 0.03}
+KERNEL = SquaredExponential(**THETA)
+SHAPES = {"squared-exponential": RBF(0.6**-0.5), "matern-5/2": Matern(0.6**-0.5, nu=2.5)}
+
+
+@pytest.fixture
+def Z():
+    return np.random.default_rng(0).normal(size=(12, 3))
+
+
+@pytest.fixture(params=KERNELS)
+def kernel(request):
+    return KERNELS[request.param](**THETA)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_training_matrix_equals_scikit_learns(Z, name):
+    theirs = ConstantKernel(1.7) * SHAPES[name] + WhiteKernel(0.03)
+    np.testing.assert_allclose(KERNELS[name](**THETA).gram(Z), theirs(Z), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_between_two_sets_there_is_no_noise_even_where_points_agree(Z, name):
+    kernel, theirs = KERNELS[name](**THETA), ConstantKernel(1.7) * SHAPES[name]
+    np.testing.assert_allclose(kernel.cross(Z[:4], Z), theirs(Z[:4], Z), rtol=1e-12)
+    assert kernel.cross(Z, Z).diagonal() == pytest.approx(kernel.variance)
+
+
+def test_at_distance_zero_a_kernel_is_its_variance(kernel):
+    assert kernel.value(np.zeros(1))[0] == kernel.variance
+
+
+def test_the_training_matrix_is_symmetric_and_positive_definite(kernel, Z):
+    K = kernel.gram(np.vstack([Z, Z]))
+    np.testing.assert_allclose(K, K.T, rtol=1e-12)
+    assert np.linalg.eigvalsh(K)[0] > 0.99 * kernel.noise
+
+
+def test_arrays_and_tensors_have_the_same_value_slope_and_curvature(kernel):
+    squared = np.random.default_rng(1).uniform(0.0, 30.0, size=(4, 5))
+    for s, like in ((squared, np.asarray), (torch.from_numpy(squared), torch.Tensor.numpy)):
+        k = kernel.value(s)
+        found = [like(x) for x in (k, kernel.slope(s, k), kernel.curvature(s, k))]
+        expected = derivatives(kernel, squared)
+        for ours, theirs in zip(found, expected, strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-12)
+
+
+def derivatives(kernel, squared):
+    """Value, slope and curvature by differentiating the value."""
+    s = torch.from_numpy(squared).requires_grad_()
+    k = kernel.value(s)
+    (slope,) = torch.autograd.grad(k.sum(), s, create_graph=True)
+    (curvature,) = torch.autograd.grad(slope.sum(), s)
+    return [x.detach().numpy() for x in (k, slope, curvature)]
+
+
+def test_slope_and_curvature_are_finite_where_points_agree_and_far_away(kernel):
+    s = np.array([0.0, 1e-300, 1e6])
+    k = kernel.value(s)
+    assert np.isfinite([k, kernel.slope(s, k), kernel.curvature(s, k)]).all()
+
+
+def test_what_a_kernel_is_given_stays_as_it_was(kernel):
+    s = np.linspace(0.0, 3.0, 7)
+    k = kernel.value(s)
+    before = s.copy(), k.copy()
+    kernel.slope(s, k), kernel.curvature(s, k)
+    np.testing.assert_array_equal((s, k), before)
+
+
+def test_a_weighted_value_gives_the_weighted_slope_and_curvature(kernel):
+    rng = np.random.default_rng(2)
+    s, w = rng.uniform(0.0, 9.0, size=(2, 20))
+    k = kernel.value(s)
+    np.testing.assert_allclose(kernel.slope(s, w * k), w * kernel.slope(s, k), rtol=1e-12)
+    np.testing.assert_allclose(kernel.curvature(s, w * k), w * kernel.curvature(s, k), rtol=1e-12)
+
+
+def test_the_linear_term_of_regression_adds_the_products(Z):
+    kernel = RegressionKernel(**THETA, linear=0.4)
+    np.testing.assert_allclose(kernel.gram(Z), KERNEL.gram(Z) + 0.4 * Z @ Z.T, rtol=1e-12)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(InputError, match=r"source_kernel: expected one of .*matern.*'cubic'"):
+        kernel_class("cubic", "source_kernel")
+
+
+def test_training_begins_at_the_papers_parameters(kernel):
+    assert type(kernel).from_log(initial_log_kernel(), 0.0).theta == pytest.approx((1, 1, 100))
+
+
+def test_the_noise_never_falls_below_its_floor(kernel):
+    log_kernel = initial_log_kernel()
+    log_kernel[2] = -1000.0
+    assert type(kernel).from_log(log_kernel, 0.05).noise == 0.05
