@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -49,20 +50,14 @@ class Address:
 
 @dataclass(frozen=True)
 class File:
-    """A file that plays or records."""
+    """A file that is played or recorded."""
 
     kind: str
     path: Path
 
 
 def parse_input(text: str) -> Address | File:
-    """Understand ``KIND[:PORT]`` or ``take:FILE``.
-
-    Raises
-    ------
-    ValueError
-        With what would be understood.
-    """
+    """The place that ``KIND[:PORT]`` or ``take:FILE`` names; ValueError for anything else."""
     place = _parse(text, IN_PORTS, IN_FILES, "livelink:11111")
     if isinstance(place, Address) and place.host != LOOPBACK:
         raise ValueError(f"{text!r}: give {place.kind}:PORT, and the address with --listen")
@@ -70,13 +65,7 @@ def parse_input(text: str) -> Address | File:
 
 
 def parse_output(text: str) -> Address | File:
-    """Understand ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE``.
-
-    Raises
-    ------
-    ValueError
-        With what would be understood.
-    """
+    """The place that ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE`` names; likewise."""
     return _parse(text, OUT_PORTS, OUT_FILES, f"vmc:{LOOPBACK}:39539")
 
 
@@ -99,18 +88,18 @@ def _parse(
 
 
 def _ends_in_port(rest: str) -> bool:
-    """Whether what follows the last colon is a number; that of [::1] is none."""
+    """Whether a port follows the last colon; after that of ``[::1]`` there is none."""
     return rest.rpartition(":")[2].isdecimal() and not rest.endswith("]")
 
 
 def open_receiver(address: Address, listen: str, wanted: Take) -> UdpReceiver:
-    """Listen for frames.
+    """A receiver of frames from the network.
 
     Parameters
     ----------
     address : Address
     listen : str
-        The machine's own address that is listened on: `LOOPBACK` for this machine alone.
+        The machine's own address to bind to: `LOOPBACK` for this machine alone.
     wanted : Take
         With the names, kind and units that the model wants.
 
@@ -136,7 +125,7 @@ def open_receiver(address: Address, listen: str, wanted: Take) -> UdpReceiver:
 
 
 def open_sender(address: Address, controls: tuple[str, ...], counters: Counters) -> UdpSender:
-    """Be ready to send poses.
+    """A sender of poses to the network.
 
     Raises
     ------
@@ -146,6 +135,48 @@ def open_sender(address: Address, controls: tuple[str, ...], counters: Counters)
     encoder = _ENCODERS[address.kind](controls)
     family, where = _resolve(address, address.host)
     return UdpSender(encoder, family, where, counters)
+
+
+def refuse_echo(receiver: UdpReceiver, sender: UdpSender) -> None:
+    """Check that poses do not go where the session itself listens, whatever the protocols.
+
+    Raises
+    ------
+    InputError
+        When its own poses would drown the performance.
+    """
+    if sender.address[1] == receiver.port and _reaches(sender.address[0], receiver.host):
+        raise InputError(
+            f"--out {sender.place}",
+            "another port than that of --in",
+            "where facert itself listens",
+            "Give the port that the other program listens on.",
+        )
+
+
+def _reaches(host: str, listening: str) -> bool:
+    """Whether packets to a host reach a listener, both on the same port."""
+    to, here = _plain(host), _plain(listening)
+    if to == here or to.is_unspecified:
+        return True
+    return here.is_unspecified and here.version >= to.version and _is_own(to)
+
+
+def _plain(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+    """The address without its scope; a mapped one of version 4 as such."""
+    found = ipaddress.ip_address(host.partition("%")[0])
+    return getattr(found, "ipv4_mapped", None) or found
+
+
+def _is_own(host: ipaddress.IPv4Address | ipaddress.IPv6Address) -> bool:
+    """Whether the address is this machine's: only then can a socket be bound to it."""
+    family = socket.AF_INET if host.version == 4 else socket.AF_INET6
+    with socket.socket(family, socket.SOCK_DGRAM) as tried:
+        try:
+            tried.bind((str(host), 0))
+        except OSError:
+            return False
+    return True
 
 
 def _decoder(kind: str, wanted: Take) -> Decoder:

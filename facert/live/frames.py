@@ -1,4 +1,4 @@
-"""What passes through a live session: what a packet tells, frames in order, and what is counted."""
+"""The interfaces of a live session: frames, counters, and the parts that frames pass through."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 class BadPacketError(ValueError):
-    """A datagram is not what it should be; it is counted and passed over."""
+    """A datagram is malformed; it is counted and passed over."""
 
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """What one sender says of one moment.
+    """One observation of one sender.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class Observed:
         Weights or markers in the order of the decoder's pattern; NaN: not observed. All NaN when
         the sender saw no face.
     sender : str
-        Whose frame it is, where the packet tells.
+        Whose frame it is, where the packet names it.
     stamp : float, optional
         Seconds on the sender's clock.
     identity : bytes, optional
-        What two frames only share when one is a copy of the other.
+        The same for two frames only when one is a copy of the other.
     """
 
     values: FloatArray
@@ -68,7 +68,7 @@ def frame_pattern(names: Sequence[str], kind: SourceKind = "weights", units: str
 
 @dataclass
 class Counters:
-    """What became of everything that came in.
+    """How many frames and packets there were, by what became of them.
 
     Attributes
     ----------
@@ -88,8 +88,8 @@ class Counters:
         Packets that could not be understood.
     unsent : int
         Packets that the system would not send.
-    unheard : int
-        Packets to this machine for which nobody listened, as far as the system tells.
+    refused : int
+        Packets to this machine for which nobody listened, as far as the system reports it.
     """
 
     received: int = 0
@@ -100,11 +100,11 @@ class Counters:
     late: int = 0
     bad: int = 0
     unsent: int = 0
-    unheard: int = 0
+    refused: int = 0
 
 
 class Decoder(Protocol):
-    """Understands the packets of one protocol."""
+    """A decoder of the packets of one protocol."""
 
     pattern: Take
     """One frame of zeros: names, kind and units of what it returns."""
@@ -112,7 +112,7 @@ class Decoder(Protocol):
     """Whether its stamps count from midnight, as a timecode does."""
 
     def decode(self, packet: bytes) -> Observed | None:
-        """What the packet tells; None while its frame is not complete.
+        """The frame that a packet completes; None while it is not complete.
 
         Raises
         ------
@@ -122,12 +122,12 @@ class Decoder(Protocol):
         ...
 
     def rehearse(self, packet: bytes) -> None:
-        """Understand once more what was understood before, at no consequence."""
-        ...
+        """Decode a packet once more, without consequence, so that code and data are at hand."""
+        self.decode(packet)
 
 
 class Encoder(Protocol):
-    """Writes the packets of one protocol."""
+    """An encoder of poses as the packets of one protocol."""
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """The packets of a pose (P,) at a time in seconds."""
@@ -135,43 +135,43 @@ class Encoder(Protocol):
 
 
 class Mapper(Protocol):
-    """What makes poses of frames."""
+    """A mapper of frames to poses."""
 
     def step(self, frame: Frame) -> Streamed:
         """The pose of the next frame; raises FacertError when there is none."""
         ...
 
     def prepare(self) -> None:
-        """Do what need not wait for the next frame."""
+        """Compute ahead for the next frame."""
         ...
 
     def rehearse(self, frame: Frame) -> Streamed:
-        """Do what `step` does, and forget it: code and data are then at hand for the next frame."""
+        """Map a frame without consequence, so that code and data are at hand for the next one."""
         ...
 
 
 class Output(Protocol):
-    """Where poses go."""
+    """A place for poses, such as a file."""
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Pass on the pose of a frame, without waiting for anybody."""
         ...
 
     def close(self) -> None:
-        """Let go of what it holds."""
+        """Release files and sockets."""
         ...
 
 
 class Sender(Output, Protocol):
-    """Where poses go at once."""
+    """An output to which poses go before anything is recorded."""
 
     def rehearse(self, frame: Frame, pose: Streamed) -> None:
-        """Do all but pass it on."""
+        """Do everything but pass the pose on."""
         ...
 
 
 class Receiver(Protocol):
-    """Where frames come from."""
+    """A source of frames."""
 
     pattern: Take
     """One frame of zeros: names, kind and units of the frames."""
@@ -186,7 +186,7 @@ class Receiver(Protocol):
 
     @property
     def start_timecode(self) -> str:
-        """Of the first frame, as in Live Link Face's CSV; empty when unknown."""
+        """Timecode of the first frame, as in Live Link Face's CSV; empty when unknown."""
         ...
 
     def wait(self, seconds: float) -> list[Frame]:
@@ -194,9 +194,9 @@ class Receiver(Protocol):
         ...
 
     def rehearse(self) -> None:
-        """Understand the last packet once more, at no consequence."""
+        """Decode the last packet once more, without consequence."""
         ...
 
     def close(self) -> None:
-        """Let go of what it holds."""
+        """Release files and sockets."""
         ...

@@ -10,16 +10,16 @@ import re
 
 import numpy as np
 
-from facert.data.names import ARKIT_SHAPES, canonical
-from facert.live.frames import BadPacketError, Observed, frame_pattern
+from facert.data.names import ARKIT_SHAPES, NameIndex
+from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
 
 _FIELD = re.compile(r"([A-Za-z_]{1,40})[-&](-?\d{1,4})")
 _LEAST = len(ARKIT_SHAPES) // 2
-_PLACES = {name: place for place, name in enumerate(ARKIT_SHAPES)}
+_INDEX = NameIndex(ARKIT_SHAPES)
 
 
-class IFacialMocapDecoder:
-    """Understands iFacialMocap, both its versions; one packet is one frame."""
+class IFacialMocapDecoder(Decoder):
+    """A decoder of iFacialMocap, both its versions; one packet is one frame."""
 
     pattern = frame_pattern(ARKIT_SHAPES)
     from_midnight = False
@@ -29,7 +29,7 @@ class IFacialMocapDecoder:
         self._spelled: dict[str, int | None] = {}
 
     def decode(self, packet: bytes) -> Observed | None:
-        """What the packet tells; see `facert.live.frames.Decoder`."""
+        """The frame of a packet; see `facert.live.frames.Decoder`."""
         try:
             text = packet.decode("ascii")
         except UnicodeDecodeError as error:
@@ -43,11 +43,7 @@ class IFacialMocapDecoder:
             raise BadPacketError("not iFacialMocap")
         return Observed(values)
 
-    def rehearse(self, packet: bytes) -> None:
-        """See `facert.live.frames.Decoder`."""
-        self.decode(packet)
-
     def _place(self, name: str) -> int | None:
         if name not in self._spelled and len(self._spelled) < 16 * len(ARKIT_SHAPES):
-            self._spelled[name] = _PLACES.get(canonical(name))
+            self._spelled[name] = _INDEX.find(name)
         return self._spelled.get(name)

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +16,7 @@ import facert
 from facert.errors import FacertError, InputError, NumericalError
 from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
-from facert.live.placement import PlacementWatch
-from facert.live.rest import RestWatch
+from facert.live.opening import PlacementWatch, RestWatch
 from facert.preprocess.live_faults import MarkerWatch
 from facert.retarget.options import RetargetOptions
 
@@ -61,7 +59,7 @@ class Loaded:
     fps: float | None
 
     def calibrate(self, rest: FloatArray) -> None:
-        """Make up for where the actor is at rest."""
+        """Shift frames by where the actor is at rest, in both streams."""
         self.stream.calibrate(rest)
         self.twin.calibrate(rest)
 
@@ -79,7 +77,7 @@ class ModelFile:
         self._seen: Signature | None = None
 
     def changed(self) -> bool:
-        """Whether there is another file than the one that was loaded last, or tried."""
+        """Whether the file is another than the one that was loaded last, or tried."""
         found = self._signature()
         return found is not None and found != self._seen
 
@@ -89,7 +87,7 @@ class ModelFile:
         return facert.load(self.path)
 
     def _signature(self) -> Signature | None:
-        """What changes with the file; None while there is none."""
+        """Time, size and number of the file; None while there is none."""
         try:
             found = self.path.stat()
         except OSError:
@@ -153,18 +151,13 @@ class LiveModel:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stop.set()
         self._thread.join()
 
     @property
     def retargeter(self) -> Retargeter:
-        """The one in use."""
+        """The retargeter in use."""
         return self._loaded.retargeter
 
     @property
@@ -195,7 +188,7 @@ class LiveModel:
         return _finite(self._loaded.stream, frame)
 
     def prepare(self) -> None:
-        """Do what need not wait for the next frame."""
+        """Calibrate and check placement when it is time, and compute ahead for the next frame."""
         watch = self._rest_watch
         if watch is not None and watch.is_over:
             self._rest = watch.rest(self.retargeter.source_units.scale)
@@ -203,17 +196,17 @@ class LiveModel:
             self._loaded.calibrate(self._rest)
             log.info("calibrated: the actor at rest is known")
         if self._placement is not None and self._placement.is_over:
-            self._placement.tell()
+            self._placement.warn()
             self._placement = None
-        with suppress(np.linalg.LinAlgError, ArithmeticError):  # the next step meets and tells it
+        with suppress(np.linalg.LinAlgError, ArithmeticError):  # the next step meets and reports it
             self._loaded.stream.prepare()
 
     def rehearse(self, frame: Frame) -> Streamed:
-        """Map a frame once more, on a stream beside; see `facert.live.frames.Mapper`."""
+        """Map a frame on the twin; see `facert.live.frames.Mapper`."""
         return _finite(self._loaded.twin, frame)
 
     def _measure_rate(self, time: float) -> None:
-        """Begin again at the true rate when enough frames have told it."""
+        """Begin again at the measured rate when there were enough frames."""
         self._times.append(time)
         if len(self._times) == _MEASURED:
             self._fps = nominal_rate(np.array(self._times))
@@ -232,10 +225,11 @@ class LiveModel:
     def _with_streams(self, retargeter: Retargeter, options: RetargetOptions) -> Loaded:
         names = self._pattern.source.names
         stream = retargeter.stream(names, self._fps, options)
-        deaf, motion = options, retargeter.motion
+        fixed_noise, motion = options, retargeter.motion
         if options.sigma is None and motion is not None:  # a twin has no noise to measure
-            deaf = replace(options, sigma=motion.sigma * retargeter.source_units.scale)
-        twin = retargeter.stream(names, self._fps, deaf)
+            sigma = motion.sigma * retargeter.source_units.scale
+            fixed_noise = replace(options, sigma=sigma)
+        twin = retargeter.stream(names, self._fps, fixed_noise)
         return Loaded(retargeter, options, stream, twin, self._fps)
 
     def _prepare(self, retargeter: Retargeter) -> Loaded:
@@ -261,22 +255,15 @@ class LiveModel:
 
     def _reload(self) -> Loaded:
         retargeter = self._file.load()
-        if retargeter.controls.names != self.retargeter.controls.names:
-            raise InputError(
-                "/target/names",
-                "the controls that the session began with",
-                "others",
-                "Stop, and begin again with this model.",
-                str(self._file.path),
+        same_controls = retargeter.controls.names == self.retargeter.controls.names
+        if not same_controls or retargeter.layout != self.retargeter.layout:
+            field, what = (
+                ("/source/names", "markers or weights that the session began with, in their order")
+                if same_controls
+                else ("/target/names", "controls that the session began with")
             )
-        if retargeter.layout != self.retargeter.layout:
-            raise InputError(
-                "/source/names",
-                "the markers or weights that the session began with, in their order",
-                "others",
-                "Stop, and begin again with this model.",
-                str(self._file.path),
-            )
+            fix = "Stop, and begin again with this model."
+            raise InputError(field, f"the {what}", "others", fix, str(self._file.path))
         return self._prepare(retargeter)
 
 
@@ -292,7 +279,7 @@ def _finite(stream: RetargetStream, frame: Frame) -> Streamed:
 
 
 def _is_near(fps: float, retargeter: Retargeter) -> bool:
-    """Whether frames come about as often as in training: then a stream may as well go on."""
+    """Whether frames come about as often as in training: then the stream goes on."""
     motion = retargeter.motion
     return motion is None or abs(fps * motion.clock[0] - 1.0) < NEAR
 

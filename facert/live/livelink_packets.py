@@ -26,7 +26,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import ARKIT_NAMES, NameIndex, nearest
 from facert.errors import InputError
-from facert.live.frames import BadPacketError, Observed, frame_pattern
+from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
 
 log = logging.getLogger("facert")
 
@@ -50,14 +50,14 @@ _COUNT = len(PACKET_NAMES)
 _NO_FACE = np.full(_COUNT, np.nan)
 
 
-class LiveLinkDecoder:
-    """Understands Live Link Face; one packet is one frame."""
+class LiveLinkDecoder(Decoder):
+    """A decoder of Live Link Face; one packet is one frame."""
 
     pattern = frame_pattern(PACKET_NAMES)
     from_midnight = True
 
     def decode(self, packet: bytes) -> Observed | None:
-        """What the packet tells; see `facert.live.frames.Decoder`."""
+        """The frame of a packet; see `facert.live.frames.Decoder`."""
         clock = _NAME_AT + _name_length(packet)
         block = clock + _TIME.size
         if len(packet) < block:
@@ -72,13 +72,9 @@ class LiveLinkDecoder:
             identity=packet,
         )
 
-    def rehearse(self, packet: bytes) -> None:
-        """See `facert.live.frames.Decoder`."""
-        self.decode(packet)
-
 
 class LiveLinkEncoder:
-    """Writes a pose as the app would.
+    """An encoder of poses as the app sends them.
 
     Parameters
     ----------
@@ -119,7 +115,7 @@ def _name_length(packet: bytes) -> int:
 
 
 def _values(packet: bytes, start: int) -> FloatArray:
-    """The numbers of the packet, (61,); NaN where no face was seen."""
+    """The values of a packet, (61,); NaN where no face was seen."""
     count = packet[start] if len(packet) > start else 0
     if count not in (0, _COUNT) or len(packet) > start + 1 + 4 * count:
         raise BadPacketError("another number of values")
@@ -135,9 +131,9 @@ def _values(packet: bytes, start: int) -> FloatArray:
 
 
 def _halves(controls: Sequence[str]) -> IntArray:
-    """Places in the packet with the controls whose mean goes there, (3, k): place, left, right.
+    """Which controls' mean goes where in the packet, (3, k): place, left and right control.
 
-    A control that is one in ARKit as well is both of its halves.
+    A control without sides is both of its halves.
     """
     index, found, halved = NameIndex(controls), [], []
     for place, name in enumerate(PACKET_NAMES):
@@ -148,14 +144,14 @@ def _halves(controls: Sequence[str]) -> IntArray:
             found.append((place, left, right))
             halved.append(name)
     used = {column for _, *columns in found for column in columns}
-    _tell_foreign([name for column, name in enumerate(controls) if column not in used], controls)
+    _report_foreign([name for column, name in enumerate(controls) if column not in used], controls)
     if halved:
         log.info("Live Link gets the mean of the left and the right %s", ", ".join(halved))
     return np.array(found, dtype=np.int64).T
 
 
-def _tell_foreign(foreign: Sequence[str], controls: Sequence[str]) -> None:
-    """Say which controls the packet has no place for; refuse when that is all of them."""
+def _report_foreign(foreign: Sequence[str], controls: Sequence[str]) -> None:
+    """Warn about controls that the packet has no place for; refuse when that is all of them."""
     if len(foreign) == len(controls):
         near = nearest(foreign[0], PACKET_NAMES)
         raise InputError(

@@ -1,4 +1,4 @@
-"""The session: frames in, mapped, out, one after the other in one thread."""
+"""A live session: frames in, mapped, out, one after the other in one thread."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from dataclasses import dataclass
 
 from facert.errors import FacertError
 from facert.live.frames import Frame, Mapper, Output, Receiver, Sender
-from facert.live.meter import Meter
 from facert.live.recording import SourceRecord
-from facert.live.rhythm import Rhythm
+from facert.live.timing import Meter, Rhythm
 from facert.models.threads import threads_for
 
 log = logging.getLogger("facert")
 
 PATIENCE = 0.1
-"""Seconds that the session waits for a frame before it looks whether it shall stop."""
+"""Seconds that the session waits for a frame before it checks whether to stop."""
 CATCH_UP = 0.03
 """Seconds that frames which waited may take together; older ones are dropped."""
 
@@ -33,7 +32,7 @@ class Limits:
 
     @classmethod
     def of(cls, frames: int | None, seconds: float | None) -> Limits:
-        """Of what may not be given."""
+        """Limits of which each may be None: none."""
         return cls(frames or math.inf, seconds or math.inf)
 
 
@@ -105,7 +104,7 @@ class LiveSession:
         return self.counters.mapped >= limits.frames
 
     def _turn(self, frames: Sequence[Frame], limits: Limits) -> None:
-        """Map the frames that there is time for, and record all."""
+        """Map the newest frames, as many as there is time for, and record all."""
         most = max(1, int(CATCH_UP / self.meter.cost)) if self.meter.cost else len(frames)
         self.counters.dropped += max(0, len(frames) - most)
         for frame in frames[-most:]:
@@ -114,7 +113,7 @@ class LiveSession:
             self._map(frame)
         self._mapper.prepare()
         for frame in frames:
-            self._rhythm.heard(frame.arrived)
+            self._rhythm.add(frame.arrived)
             if self._record is not None:
                 self._record.add(frame)
 

@@ -8,18 +8,18 @@ from collections import deque
 from facert.live.frames import Observed
 
 SILENCE = 0.25
-"""Seconds without a frame after which whoever speaks next begins anew."""
+"""Seconds without a frame after which the next sender, whoever it is, begins anew."""
 REMEMBERED = 2**14
-"""Frames that a copy is known of: two minutes at 120 frames/s."""
+"""Frames whose copies are known: two minutes at 120 frames/s."""
 _LEAST_STEP = 1e-4
-# A clock that often steps back, or stands still, is none: some senders have such.
+# A clock that often steps back, or stands still, is not used: some senders have such.
 _STEP_BACK, _STAND_STILL, _STEP_ON, _DISTRUST = 3, 1, -1, 30
 
 
 class Order:
-    """Judges frame after frame.
+    """Admits or refuses frame after frame, and places it in time.
 
-    While a sender is heard, frames of others, copies of its own and those from before its latest
+    While a sender is active, frames of others, copies of its own and those from before its latest
     are refused. After `SILENCE` any frame is accepted: another sender, a clock that was set, a
     recording that begins again.
     """
@@ -35,16 +35,16 @@ class Order:
         self._oldest: deque[int] = deque()
 
     def admits(self, host: str, arrived: float) -> bool:
-        """Whether packets of this host are listened to now."""
-        return host == self._host or not self._heard(arrived)
+        """Whether packets of this host are accepted now."""
+        return host == self._host or not self._active(arrived)
 
     def place(self, observed: Observed, host: str, arrived: float) -> float | None:
         """The frame's time in the session, strictly rising from 0; None when it is refused."""
         if (host, observed.sender) != (self._host, self._sender):
-            if self._heard(arrived):
+            if self._active(arrived):
                 return None
             self._begin_anew(host, observed.sender)
-        elif not (self._heard(arrived) or self._resumes(observed.stamp, arrived)):
+        elif not (self._active(arrived) or self._resumes(observed.stamp, arrived)):
             self._begin_anew(host, observed.sender)
         if self._is_copy(observed.identity) or self._is_late(observed.stamp):
             return None
@@ -53,7 +53,7 @@ class Order:
         self._stamp, self._arrived = observed.stamp, arrived
         return self._time
 
-    def _heard(self, arrived: float) -> bool:
+    def _active(self, arrived: float) -> bool:
         return arrived - self._arrived < SILENCE
 
     def _resumes(self, stamp: float | None, arrived: float) -> bool:
@@ -72,7 +72,7 @@ class Order:
         return identity is not None and hash(identity) in self._known
 
     def _is_late(self, stamp: float | None) -> bool:
-        """Whether the sender's clock says that a newer frame was here before."""
+        """Whether a newer frame was here before, by the sender's clock."""
         if stamp is None or self._stamp is None or self._disorder >= _DISTRUST:
             return False
         step = stamp - self._stamp
@@ -98,12 +98,12 @@ class Order:
         return max(stamp - self._ahead, self._time + _LEAST_STEP)
 
     def _goes_on(self, stamp: float, elapsed: float) -> bool:
-        """Whether the sender's clock is to be believed, and was not set."""
+        """Whether the sender's clock runs as time does: it is reliable, and was not set."""
         if self._stamp is None or self._disorder >= _DISTRUST:
             return False
         return stamp - self._stamp < elapsed + SILENCE
 
     def _set_clock(self, moment: float, stamp: float | None) -> float:
-        """Let a sender's stamp be a moment of the session."""
+        """Tie a sender's stamp to a moment of the session."""
         self._ahead = 0.0 if stamp is None else stamp - moment
         return moment

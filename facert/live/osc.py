@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -17,6 +18,13 @@ from facert.live.frames import BadPacketError
 
 MOST_BYTES = 1400
 """Of one packet that is sent: larger ones are cut into fragments on the way."""
+LEAST, MOST = 256, 2**14
+"""Bytes of a packet that is kept as a template: shorter ones are parsed as quickly, longer ones
+would take much memory."""
+MOST_LENGTHS, MOST_ALIKE = 16, 4
+"""How many lengths of templates are kept, and how many templates of one length."""
+
+Use = TypeVar("Use")
 
 _BUNDLE = b"#bundle\0"
 _AT_ONCE = _BUNDLE + struct.pack(">Q", 1)
@@ -112,7 +120,7 @@ def _message(packet: bytes, place: int) -> Message:
 
 
 def _after(packet: bytes, tag: str, position: int) -> int:
-    """Where an argument ends that nobody here asks for."""
+    """The end of an argument that is passed over."""
     if tag == "b":
         (size,) = _INT.unpack_from(packet, position)
         length = _INT.size + size + -size % 4 if size >= 0 else len(packet)
@@ -126,7 +134,7 @@ def _after(packet: bytes, tag: str, position: int) -> int:
 
 
 def _text(packet: bytes, position: int) -> tuple[str, int]:
-    """A text that ends with NUL, and where what follows it begins."""
+    """A text that ends with NUL, and the position of what follows it."""
     end = packet.find(b"\0", position)
     if end < 0:
         raise BadPacketError("a text without an end")
@@ -153,7 +161,9 @@ def _padded(text: str) -> bytes:
 
 
 class Bundles:
-    """Messages that end with a number each, packed once; only the numbers change from then on.
+    """Messages that end with a number each, packed once: only the numbers change from then on.
+
+    A message that is longer than `MOST_BYTES` goes alone.
 
     Parameters
     ----------
@@ -161,18 +171,14 @@ class Bundles:
         Each ends with a float.
     last : bytes
         A message that follows all others, if any.
-    most : int
-        Bytes of one packet; a message that is longer goes alone.
     """
 
-    def __init__(
-        self, messages: Sequence[bytes], last: bytes = b"", most: int = MOST_BYTES
-    ) -> None:
+    def __init__(self, messages: Sequence[bytes], last: bytes = b"") -> None:
         elements = [_INT.pack(len(raw)) + raw for raw in messages]
         ending = _INT.pack(len(last)) + last if last else b""
         self._packets: list[tuple[FloatArray, IntArray, slice]] = []
         begin = 0
-        for end in _groups([len(element) for element in elements], most - len(ending)):
+        for end in _groups([len(element) for element in elements], MOST_BYTES - len(ending)):
             packed = b"".join(elements[begin:end]) + (ending if end == len(elements) else b"")
             words = np.frombuffer(_AT_ONCE + packed, ">f4").copy()
             ends = len(_AT_ONCE) + np.cumsum([len(element) for element in elements[begin:end]])
@@ -197,3 +203,57 @@ def _groups(sizes: Sequence[int], most: int) -> list[int]:
             filled = len(_AT_ONCE)
         filled += size
     return [*ends, len(sizes)]
+
+
+class PacketTemplate:
+    """A datagram with room for other numbers.
+
+    A performer sends the same messages frame after frame: while every other word stays what it
+    was, a datagram is read as a whole instead of message by message.
+
+    Parameters
+    ----------
+    packet : bytes
+    messages : sequence of Message
+        As parsed from it; all numbers have a place.
+    """
+
+    def __init__(self, packet: bytes, messages: Sequence[Message]) -> None:
+        places = [one.place // _INT.size + k for one in messages for k in range(len(one.numbers))]
+        self._places = np.array(places, dtype=np.int64)
+        words = np.frombuffer(packet, np.uint32)
+        self._fixed = np.delete(np.arange(len(words)), self._places)
+        self._words = words[self._fixed]
+
+    def numbers(self, packet: bytes) -> FloatArray | None:
+        """The numbers of another datagram of that length, in order; None if other words differ."""
+        words = np.frombuffer(packet, np.uint32)
+        if (words.take(self._fixed) != self._words).any():
+            return None
+        with np.errstate(invalid="ignore"):  # of signalling NaN
+            return words.view(">f4").take(self._places).astype(np.float64)
+
+
+class PacketTemplates(Generic[Use]):
+    """Templates of datagrams that came before, up to a limit, each with the use of its numbers."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, list[tuple[PacketTemplate, Use]]] = {}
+
+    def find(self, packet: bytes) -> tuple[Use, FloatArray] | None:
+        """The use of a datagram's numbers, and the numbers; None where no template fits."""
+        for template, use in self._known.get(len(packet), ()):
+            numbers = template.numbers(packet)
+            if numbers is not None:
+                return use, numbers
+        return None
+
+    def remember(self, packet: bytes, messages: Sequence[Message], use: Use) -> None:
+        """Keep a datagram as a template, if its numbers are whole words and there is room."""
+        if not LEAST <= len(packet) <= MOST or len(packet) % _INT.size:
+            return
+        if any(one.place < 0 or one.place % _INT.size for one in messages):
+            return
+        alike = self._known.get(len(packet), [])
+        if len(alike) < MOST_ALIKE and (alike or len(self._known) < MOST_LENGTHS):
+            self._known[len(packet)] = [*alike, (PacketTemplate(packet, messages), use)]

@@ -19,19 +19,19 @@ from facert.live.frames import BadPacketError, Counters, Decoder, Frame, Observe
 from facert.live.order import Order
 
 BUFFER = 2**22
-"""Bytes that the system is asked to keep for us while we are busy."""
+"""Bytes that the system is asked to keep while frames are mapped."""
 AT_ONCE = 256
 AT_MOST = 0.005
-"""Packets, and seconds, before frames are mapped: a flood must not keep us from that."""
-TOLD = 5
-"""Bad packets that are told about: a flood must not fill the terminal."""
+"""Packets, and seconds, before frames are mapped: a flood must not prevent that."""
+LOGGED = 5
+"""Bad packets that are logged: a flood must not fill the terminal."""
 _LARGEST = 2**16
 
 log = logging.getLogger("facert")
 
 
 class UdpReceiver:
-    """Frames from a socket.
+    """A receiver of frames from a socket.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class UdpReceiver:
                 packet, address = self._socket.recvfrom(_LARGEST)
             except BlockingIOError:
                 return
-            except OSError:  # Windows tells here of packets that nobody took
+            except OSError:  # Windows reports here packets that nobody took
                 continue
             yield packet, str(address[0]), time.perf_counter()
 
@@ -116,11 +116,11 @@ class UdpReceiver:
         return self._seen(observed, placed, arrived)
 
     def _count_bad(self, packet: bytes, host: str, error: BadPacketError) -> None:
-        """Count a packet, and tell about it unless there were many."""
+        """Count a bad packet, and log it unless there were many."""
         self.counters.bad += 1
-        if self.counters.bad <= TOLD:
+        if self.counters.bad <= LOGGED:
             log.debug("bad packet of %d bytes from %s: %s", len(packet), host, error)
-        if self.counters.bad == TOLD:
+        if self.counters.bad == LOGGED:
             log.debug("further bad packets are only counted")
 
     def _seen(self, observed: Observed, placed: float, arrived: float) -> Frame | None:
@@ -134,7 +134,7 @@ class UdpReceiver:
 
 
 class TakeReceiver:
-    """Plays a take at the times of its frames.
+    """A receiver that plays a take at the times of its frames.
 
     Parameters
     ----------

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 import logging
-import math
 import tempfile
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,55 +25,119 @@ if TYPE_CHECKING:
 log = logging.getLogger("facert")
 
 
-@dataclass(frozen=True)
-class TakeFile:
-    """A take that will be written when the performance is over, and must not fail then."""
+class SpooledRows:
+    """Rows of equal length in a nameless file, so that memory does not grow with time."""
 
-    path: Path
-    overwrite: bool
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115
+        self._full = False
+        self._width = 0
+        self.count = 0
 
-    def rehearse(self, take: Take) -> None:
-        """Write a take of the same kind beside the file's place, and remove it.
-
-        Raises
-        ------
-        OutputExistsError
-            When the file exists and may not be overwritten.
-        InputError
-            When the format cannot hold such a take, or nothing can be written there.
-        """
-        if self.path.exists() and not self.overwrite:
-            raise OutputExistsError(self.path)
+    def add(self, row: FloatArray) -> None:
+        """Keep one more row; when the disk is full, no more, with a warning: the show goes on."""
+        if self._full:
+            return
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=self.path.parent) as folder:
-                write_take_file(take, Path(folder) / self.path.name)
+            self._file.write(row.tobytes())
+            self.count, self._width = self.count + 1, len(row)
+        except OSError as error:
+            self._full = True
+            log.warning("recorded no further than %d frames: %s", self.count, error.strerror)
+
+    def close(self) -> None:
+        """Discard all rows."""
+        self._file.close()
+
+    def read(self) -> FloatArray:
+        """All rows, (count, width)."""
+        self._file.seek(0)
+        whole = np.frombuffer(self._file.read(8 * self.count * self._width))
+        return whole.reshape(self.count, self._width)
+
+
+class _Record(ABC):
+    """A take that is written when the performance is over, and must not fail then.
+
+    So a take of the same kind is written at once, beside the file's place, and removed.
+
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+        Allow to replace a file that exists.
+    like : Take
+        A take with the names, units and controls of the record, whatever its frames.
+
+    Raises
+    ------
+    OutputExistsError
+        When the file exists and may not be overwritten.
+    InputError
+        When the format cannot hold such a take, or nothing can be written there.
+    """
+
+    def __init__(self, path: Path, overwrite: bool, like: Take) -> None:
+        self._path, self._overwrite, self._like = path, overwrite, like
+        self._rehearse()
+        self._rows = SpooledRows()
+
+    def close(self) -> None:
+        """Discard what was not written."""
+        self._rows.close()
+
+    def write(self, start_timecode: str) -> Path | None:
+        """Write the take, as HDF5 where the format cannot hold it.
+
+        Returns
+        -------
+        Path or None
+            Where it is; None when there was no frame.
+        """
+        if not self._rows.count:
+            log.warning("%s: not written, as there was no frame", self._path)
+            return None
+        table = self._rows.read()
+        time = table[:, 0] - table[0, 0]
+        fields = self._fields(table[:, 1:])
+        take = replace(
+            self._like, time=time, fps=nominal_rate(time), start_timecode=start_timecode, **fields
+        )
+        try:
+            return self._write(take, self._path)
+        except InputError as error:
+            instead = self._write(take, self._path.with_name(f"{self._path.name}.h5"))
+            log.warning("written to %s instead: %s", instead, error)
+            return instead
+
+    @abstractmethod
+    def _fields(self, table: FloatArray) -> dict[str, Any]:
+        """The take's frames, from the rows without their times, (T, width - 1)."""
+
+    def _source(self, values: FloatArray) -> Source:
+        like = self._like.source
+        return Source(values.reshape(-1, *like.values.shape[1:]), like.names)
+
+    def _rehearse(self) -> None:
+        if self._path.exists() and not self._overwrite:
+            raise OutputExistsError(self._path)
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=self._path.parent) as folder:
+                write_take_file(self._like, Path(folder) / self._path.name)
         except OSError as error:
             raise InputError(
                 "output",
                 "a folder that can be written to",
                 error.strerror or str(error),
                 "Choose another place.",
-                str(self.path),
+                str(self._path),
             ) from error
-
-    def leave_out(self) -> None:
-        """Say why the file is not written."""
-        log.warning("%s: not written, as there was no frame", self.path)
-
-    def write(self, take: Take) -> Path:
-        """Write the take, as HDF5 where the format cannot hold it; return where."""
-        try:
-            return self._write(take, self.path)
-        except InputError as error:
-            instead = self._write(take, self.path.with_name(f"{self.path.name}.h5"))
-            log.warning("written to %s instead: %s", instead, error)
-            return instead
 
     def _write(self, take: Take, path: Path) -> Path:
         """Write the take beside a file that appeared meanwhile: both are precious."""
-        place = path if self.overwrite else _free(path)
-        write_take_file(take, place, self.overwrite)
+        place = path if self._overwrite else _free(path)
+        write_take_file(take, place, self._overwrite)
         if place != path:
             log.warning("%s appeared meanwhile: written to %s", path, place)
         return place
@@ -88,122 +152,31 @@ def _free(path: Path) -> Path:
     return place
 
 
-class SpooledRows:
-    """Rows of equal length in a nameless file, so that memory does not grow with time."""
-
-    def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115
-        self._full = False
-        self.count = 0
-
-    def add(self, row: FloatArray) -> None:
-        """Keep one more row; when the disk is full, no more, with a warning: the show goes on."""
-        if self._full:
-            return
-        try:
-            self._file.write(row.tobytes())
-            self.count += 1
-        except OSError as error:
-            self._full = True
-            log.warning("recorded no further than %d frames: %s", self.count, error.strerror)
-
-    def close(self) -> None:
-        """Forget them all."""
-        self._file.close()
-
-    def read(self, width: int) -> FloatArray:
-        """All rows, (count, width)."""
-        self._file.seek(0)
-        whole = np.frombuffer(self._file.read(8 * self.count * width))
-        return whole.reshape(-1, width)
-
-
-class SourceRecord:
-    """Every frame that came in.
-
-    Parameters
-    ----------
-    file : TakeFile
-    like : Take
-        A take with the session's names and units, whatever its frames.
-
-    Raises
-    ------
-    OutputExistsError, InputError
-        When the file could not be written at the end.
-    """
-
-    def __init__(self, file: TakeFile, like: Take) -> None:
-        file.rehearse(like)
-        self._file, self._like, self._rows = file, like, SpooledRows()
+class SourceRecord(_Record):
+    """Every frame that came in."""
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
         self._rows.add(np.append(frame.time, frame.values))
 
-    def close(self) -> None:
-        """Forget what was not written."""
-        self._rows.close()
-
-    def write(self, start_timecode: str) -> Path | None:
-        """Write the take; None when there is nothing to write."""
-        if not self._rows.count:
-            self._file.leave_out()
-            return None
-        shape = self._like.source.values.shape[1:]
-        table = self._rows.read(1 + math.prod(shape))
-        source = Source(table[:, 1:].reshape(-1, *shape), self._like.source.names)
-        take = replace(self._like, **_clock(table[:, 0], start_timecode), source=source)
-        return self._file.write(take)
+    def _fields(self, table: FloatArray) -> dict[str, Any]:
+        return {"source": self._source(table)}
 
 
-class PoseRecord:
-    """Every pose that was sent, with the cleaned frame that it comes from.
-
-    Parameters
-    ----------
-    file : TakeFile
-    like : Take
-        A take with the names and units of the cleaned frames, whatever they are.
-    controls : Controls
-        Of the poses.
-
-    Raises
-    ------
-    OutputExistsError, InputError
-        When the file could not be written at the end.
-    """
-
-    def __init__(self, file: TakeFile, like: Take, controls: Controls) -> None:
-        file.rehearse(replace(like, controls=controls, params=np.zeros((1, len(controls.names)))))
-        self._file, self._like, self._controls, self._rows = file, like, controls, SpooledRows()
+class PoseRecord(_Record):
+    """Every pose that was sent, with the cleaned frame that it comes from."""
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Keep a pose, its standard deviation, and its source."""
         std = np.full(len(pose.params), np.nan) if pose.std is None else pose.std
         self._rows.add(np.concatenate([[frame.time], pose.params, std, pose.source.ravel()]))
 
-    def close(self) -> None:
-        """Forget what was not written."""
-        self._rows.close()
-
-    def write(self, start_timecode: str) -> Path | None:
-        """Write the take; None when there is nothing to write."""
-        if not self._rows.count:
-            self._file.leave_out()
-            return None
-        count, shape = len(self._controls.names), self._like.source.values.shape[1:]
-        table = self._rows.read(1 + 2 * count + math.prod(shape))
-        time, params, std, values = np.split(table, [1, 1 + count, 1 + 2 * count], axis=1)
-        take = replace(
-            self._like,
-            **_clock(time[:, 0], start_timecode),
-            source=Source(values.reshape(-1, *shape), self._like.source.names),
-            controls=self._controls,
-            params=params,
-            std=None if np.isnan(std).all() else std,
-        )
-        return self._file.write(take)
+    def _fields(self, table: FloatArray) -> dict[str, Any]:
+        assert self._like.controls is not None  # `Recordings.poses` gives them
+        count = len(self._like.controls.names)
+        params, std, values = np.split(table, [count, 2 * count], axis=1)
+        known = None if np.isnan(std).all() else std
+        return {"source": self._source(values), "params": params, "std": known}
 
 
 class Recordings:
@@ -224,19 +197,22 @@ class Recordings:
     def __init__(
         self, incoming: Take, cleaned: tuple[str, ...], controls: Controls, overwrite: bool
     ) -> None:
-        self._incoming, self._controls, self._overwrite = incoming, controls, overwrite
-        self._cleaned = frame_pattern(cleaned, incoming.source.kind, incoming.units)
+        self._incoming, self._overwrite = incoming, overwrite
+        like = frame_pattern(cleaned, incoming.source.kind, incoming.units)
+        self._posed = replace(like, controls=controls, params=np.zeros((1, len(controls.names))))
         self._records: dict[Path, SourceRecord | PoseRecord] = {}
 
     def source(self, path: Path) -> SourceRecord:
-        """A file of what comes in."""
-        record = SourceRecord(self._file(path), self._incoming)
+        """A new file of what comes in; raises what `_Record` does."""
+        self._require_new(path)
+        record = SourceRecord(path, self._overwrite, self._incoming)
         self._records[path.absolute()] = record
         return record
 
     def poses(self, path: Path) -> PoseRecord:
-        """A file of the poses."""
-        record = PoseRecord(self._file(path), self._cleaned, self._controls)
+        """A new file of the poses; raises what `_Record` does."""
+        self._require_new(path)
+        record = PoseRecord(path, self._overwrite, self._posed)
         self._records[path.absolute()] = record
         return record
 
@@ -262,19 +238,12 @@ class Recordings:
         return [path for path in written if path is not None]
 
     def close(self) -> None:
-        """Forget what was not written."""
+        """Discard what was not written."""
         for record in self._records.values():
             record.close()
 
-    def _file(self, path: Path) -> TakeFile:
+    def _require_new(self, path: Path) -> None:
         if path.absolute() in self._records:
             raise InputError(
                 "output", "a file for each recording", "one for two", "Rename one.", str(path)
             )
-        return TakeFile(path, self._overwrite)
-
-
-def _clock(time: FloatArray, start_timecode: str) -> dict[str, Any]:
-    """The fields of a take that begins at 0 and runs at its own rate."""
-    begun = time - time[0]
-    return {"time": begun, "fps": nominal_rate(begun), "start_timecode": start_timecode}

@@ -25,7 +25,7 @@ def written_place(host: str, port: int) -> str:
 
 
 class UdpSender:
-    """Sends each pose at once and never waits for anybody.
+    """Sends each pose at once, without ever waiting.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class UdpSender:
         counters: Counters,
     ) -> None:
         self.address = address
-        self._told = False
+        self._warned = False
         self._encoder, self._counters = encoder, counters
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -76,7 +76,7 @@ class UdpSender:
         self._encoder.encode(pose.params, frame.time)
 
     def _connect(self) -> bool:
-        """Let the system tell when nobody listens on this machine.
+        """Connect to an address of this machine, so that the system reports when nobody listens.
 
         To another machine, a connected socket would stay with the network that there is now.
         """
@@ -84,7 +84,7 @@ class UdpSender:
             return False
         try:
             self._socket.connect(self.address)
-        except OSError:  # told about when there is something to send
+        except OSError:  # reported when there is something to send
             return False
         return True
 
@@ -95,15 +95,15 @@ class UdpSender:
         try:
             self._socket.send(packet)
         except ConnectionError:  # of the packet before; this one was not sent
-            self._count_unheard()
+            self._count_refused()
             with suppress(ConnectionError):
                 self._socket.send(packet)
 
-    def _count_unheard(self) -> None:
-        if not self._told:
+    def _count_refused(self) -> None:
+        if not self._warned:
             log.warning("nobody listens on %s; poses are sent there all the same", self.place)
-            self._told = True
-        self._counters.unheard += 1
+            self._warned = True
+        self._counters.refused += 1
 
     def close(self) -> None:
         """Close the socket."""

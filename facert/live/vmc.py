@@ -13,20 +13,19 @@ What a frame does not bring counts as not observed.
 
 from __future__ import annotations
 
-import math
 import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex
 from facert.data.take import SourceKind
-from facert.live.frames import BadPacketError, Observed, frame_pattern
-from facert.live.osc import Bundles, Message, message, parse
-from facert.live.osc_layout import PacketTemplates
+from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
+from facert.live.osc import Bundles, Message, PacketTemplates, message, parse
 
 _VMC = "/VMC/"
 _VALUE, _CLOCK, _APPLY = "/VMC/Ext/Blend/Val", "/VMC/Ext/T", "/VMC/Ext/Blend/Apply"
@@ -37,29 +36,25 @@ _MOST_SPELLINGS = 4096
 
 @dataclass(frozen=True, eq=False)
 class _Use:
-    """What the numbers of a datagram are for.
+    """The use of a datagram's numbers, as far as they belong to one frame.
 
     Parameters
     ----------
     columns, numbers : arrays of int, shape (k,)
         Where values belong, and which of the numbers they are.
-    clock : int, or None
-        Which of the numbers is the sender's clock.
-    last : Message, or None
-        What completes the frame.
-    stamp : int, or None
-        Which of the numbers comes with that.
+    clock, end : slice or None
+        The numbers of the sender's clock, and of the message that completes the frame; None where
+        there is no such message.
     """
 
     columns: IntArray
     numbers: IntArray
-    clock: int | None
-    last: Message | None
-    stamp: int | None
+    clock: slice | None
+    end: slice | None
 
 
-class OscDecoder:
-    """Understands VMC and plain messages; a frame may be spread over several packets.
+class OscDecoder(Decoder):
+    """A decoder of VMC and plain messages; a frame may be spread over several packets.
 
     Parameters
     ----------
@@ -67,7 +62,7 @@ class OscDecoder:
         Of the weights or markers that are wanted, found in any spelling; others are passed over.
     kind : {"weights", "markers"}
     units : str
-        Of markers: those of the model, as packets do not tell.
+        Of markers: those of the model, as packets do not name any.
     """
 
     from_midnight = False
@@ -75,103 +70,84 @@ class OscDecoder:
     def __init__(self, names: Sequence[str], kind: SourceKind, units: str = "") -> None:
         self.pattern = frame_pattern(names, kind, units)
         self._numbers = 3 if kind == "markers" else 1
-        self._index = NameIndex(names)
-        self._places: dict[str, int | None] = {}
+        self._place = lru_cache(_MOST_SPELLINGS)(NameIndex(names).find)
         self._empty = np.full((len(names), self._numbers), np.nan)
         self._values = self._empty.copy()
         self._stamp: float | None = None
-        self._templates: PacketTemplates[_Use] = PacketTemplates()
+        self._templates: PacketTemplates[list[_Use]] = PacketTemplates()
 
     def decode(self, packet: bytes) -> Observed | None:
-        """What the packet tells; see `facert.live.frames.Decoder`."""
+        """The frame that a packet completes; see `facert.live.frames.Decoder`."""
         found = self._templates.find(packet)
-        if found is not None:
-            return self._filled(*found)
-        messages = parse(packet)
-        if not all(math.isfinite(number) for one in messages for number in one.numbers):
+        if found is None:
+            messages = parse(packet)
+            numbers = np.array([number for one in messages for number in one.numbers], np.float64)
+            uses = self._uses(messages)
+        else:
+            uses, numbers = found
+        if not np.isfinite(numbers).all():
             raise BadPacketError("NaN or infinity")
+        if found is None:
+            self._templates.remember(packet, messages, uses)
         observed = None
-        for one in messages:
-            if one.address == _APPLY or one.address.endswith(_FRAME):
-                observed = self._complete(one)
-            elif one.address == _CLOCK:
-                self._stamp = one.numbers[0] if one.numbers else None
-            else:
-                self._note(one)
-        use = self._use(messages)
-        if use is not None:
-            self._templates.remember(packet, messages, use)
+        for use in uses:
+            observed = self._fill(use, numbers) or observed
         return observed
 
     def rehearse(self, packet: bytes) -> None:
-        """See `facert.live.frames.Decoder`."""
+        """See `facert.live.frames.Decoder`; nothing is filled in."""
         self._templates.find(packet)
 
-    def _filled(self, use: _Use, numbers: FloatArray) -> Observed | None:
-        """What a datagram tells that is like one before, by its numbers."""
-        if not np.isfinite(numbers).all():
-            raise BadPacketError("NaN or infinity")
+    def _fill(self, use: _Use, numbers: FloatArray) -> Observed | None:
+        """The frame that a datagram's numbers complete, if they do."""
         self._values.reshape(-1)[use.columns] = numbers[use.numbers]
         if use.clock is not None:
-            self._stamp = float(numbers[use.clock])
-        if use.last is None:
+            self._stamp = _first(numbers[use.clock])
+        if use.end is None:
             return None
-        stamp = () if use.stamp is None else (float(numbers[use.stamp]),)
-        return self._complete(replace(use.last, numbers=stamp))
+        stamp = _first(numbers[use.end])
+        stamp = self._stamp if stamp is None else stamp
+        values = self._values if self._numbers == 3 else self._values[:, 0]
+        identity = None if stamp is None else struct.pack("d", stamp) + values.tobytes()
+        self._values, self._stamp = self._empty.copy(), None
+        return Observed(values, stamp=stamp, identity=identity)
 
-    def _use(self, messages: Sequence[Message]) -> _Use | None:
-        """What the numbers of messages are for; None where that is not always the same."""
-        columns, numbers = [], []
-        clock = last = stamp = None
-        count = 0
-        for one in messages:
-            if last is not None or (one.address == _CLOCK and not one.numbers):
-                return None
-            if one.address == _APPLY or one.address.endswith(_FRAME):
-                last, stamp = one, count if one.numbers else None
-            elif one.address == _CLOCK:
-                clock = count
-            else:
-                place = self._wanted(one)
-                if place is not None:
-                    columns += [place * self._numbers + k for k in range(self._numbers)]
-                    numbers += [count + k for k in range(self._numbers)]
-            count += len(one.numbers)
-        return _Use(np.array(columns, np.int64), np.array(numbers, np.int64), clock, last, stamp)
-
-    def _note(self, one: Message) -> None:
-        """Keep what a message says of a name that is wanted."""
-        place = self._wanted(one)
-        if place is not None:
-            self._values[place] = one.numbers
+    def _uses(self, messages: Sequence[Message]) -> list[_Use]:
+        """The use of the messages' numbers, one for each frame that they belong to."""
+        uses: list[_Use] = []
+        columns: list[int] = []
+        numbers: list[int] = []
+        clock, count = None, 0
+        for position, one in enumerate(messages, 1):
+            own = slice(count, count + len(one.numbers))
+            count = own.stop
+            ends = one.address == _APPLY or one.address.endswith(_FRAME)
+            if one.address == _CLOCK:
+                clock = own
+            elif not ends and (place := self._wanted(one)) is not None:
+                columns += range(place * self._numbers, (place + 1) * self._numbers)
+                numbers += range(own.start, own.stop)
+            if ends or position == len(messages):
+                found = np.array(columns, np.int64), np.array(numbers, np.int64)
+                uses.append(_Use(*found, clock, own if ends else None))
+                columns, numbers, clock = [], [], None
+        return uses
 
     def _wanted(self, one: Message) -> int | None:
-        """Where its numbers belong, if they do."""
+        """Where a message's numbers belong, if they do."""
         if len(one.numbers) != self._numbers:
             return None
         if one.address.startswith(_VMC):
             return self._place(one.texts[0] if one.address == _VALUE and one.texts else "")
         return self._place(one.address.rpartition("/")[2])
 
-    def _place(self, name: str) -> int | None:
-        if name in self._places:
-            return self._places[name]
-        place = self._index.find(name)
-        if len(self._places) < _MOST_SPELLINGS:
-            self._places[name] = place
-        return place
 
-    def _complete(self, one: Message) -> Observed:
-        """The frame, and a clean slate for the next one."""
-        stamp = one.numbers[0] if one.numbers else self._stamp
-        values = self._values if self._numbers == 3 else self._values[:, 0]
-        identity = None if stamp is None else struct.pack("d", stamp) + values.tobytes()
-        self._values, self._stamp = self._empty.copy(), None
-        return Observed(values, stamp=stamp, identity=identity)
+def _first(numbers: FloatArray) -> float | None:
+    return float(numbers[0]) if len(numbers) else None
 
 
 class VmcEncoder:
-    """Writes a pose as a VMC performer does.
+    """An encoder of poses as a VMC performer sends them.
 
     Parameters
     ----------
@@ -183,17 +159,17 @@ class VmcEncoder:
         self._bundles = Bundles([message(_CLOCK, 0.0), *values], last=message(_APPLY))
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
-        """The clock, every control, and the word to apply them."""
+        """The clock, every control, and the message that applies them."""
         return self._bundles.filled(np.concatenate([[time], params]))
 
 
 class OscEncoder:
-    """Writes a pose as plain messages ``/facert/NAME f``, in bundles.
+    """An encoder of poses as plain messages ``/facert/NAME f``, in bundles.
 
     Parameters
     ----------
     controls : sequence of str, length P
-        Signs that an address cannot hold become ``_``.
+        Characters that an address cannot hold become ``_``.
     """
 
     def __init__(self, controls: Sequence[str]) -> None:
@@ -202,5 +178,5 @@ class OscEncoder:
         self._bundles = Bundles([*values, message(f"/facert{_FRAME}", 0.0)])
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
-        """Every control, and the word that the frame is complete."""
+        """Every control, and the message that completes the frame."""
         return self._bundles.filled(np.concatenate([params, [time]]))

@@ -6,8 +6,7 @@ import pytest
 
 from facert.data.names import ARKIT_SHAPES
 from facert.errors import InputError
-from facert.live.echo import refuse_echo
-from facert.live.endpoints import Address, open_receiver, open_sender
+from facert.live.endpoints import Address, open_receiver, open_sender, refuse_echo
 from facert.live.frames import Counters, frame_pattern
 
 
@@ -63,6 +62,6 @@ def test_what_would_come_back_is_refused_and_nothing_else(listen, host):
         bound.sendto(b"pose", (host, bound.getsockname()[1]))
         try:
             comes_back = bound.recv(10) == b"pose"
-        except OSError:  # nothing came, or the port was told to be free there
+        except OSError:  # nothing came, or the system reports that the port is free
             comes_back = False
     assert is_refused(listen, host) == comes_back

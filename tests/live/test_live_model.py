@@ -93,17 +93,17 @@ def test_a_new_file_is_taken_over_between_two_frames(path, take, models, caplog)
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("broken", "the model in use stays"), ("other", "begin again")]
+    ("name", "warning"), [("broken", "the model in use stays"), ("other", "begin again")]
 )
 def test_a_file_that_is_broken_or_of_other_controls_leaves_the_model_in_use(
-    path, take, models, tmp_path, caplog, name, said
+    path, take, models, tmp_path, caplog, name, warning
 ):
     (tmp_path / "broken.safetensors").write_bytes(b"half a model")
     with opened(path, take) as model:
         before = model.retargeter
         folder = models if name == "other" else tmp_path
         replaced(path, folder / f"{name}.safetensors")
-        until(lambda: said in caplog.text)
+        until(lambda: warning in caplog.text)
         model.step(frames(take)[0])
         assert model.retargeter is before
 
@@ -138,8 +138,8 @@ def test_a_frame_that_cannot_be_mapped_is_an_error_and_not_a_pose(path, take):
 def test_rehearsals_leave_no_trace(path, take):
     rehearsed, plain = opened(path, take), opened(path, take)
     for frame in frames(take):
-        said = rehearsed.rehearse(frame)
-        assert np.isfinite(said.params).all()
+        pose = rehearsed.rehearse(frame)
+        assert np.isfinite(pose.params).all()
         rehearsed.prepare()
         expected = plain.step(frame).params
         np.testing.assert_array_equal(rehearsed.step(frame).params, expected)
@@ -159,10 +159,10 @@ def test_from_the_seconds_of_rest_on_frames_are_calibrated(path, take, caplog):
     model, plain = opened(path, take, rest_seconds=0.5), opened(path, take)
     apart = []
     for frame in [*rest, *show]:
-        said = model.step(moved(frame, by)).params
-        apart.append(np.abs(said - plain.step(frame).params).max())
+        pose = model.step(moved(frame, by)).params
+        apart.append(np.abs(pose - plain.step(frame).params).max())
         model.prepare()
-        np.testing.assert_allclose(model.rehearse(moved(frame, by)).params.shape, said.shape)
+        np.testing.assert_allclose(model.rehearse(moved(frame, by)).params.shape, pose.shape)
     assert min(apart[:15]) > 0.05
     assert max(apart[30:]) < 0.01
     assert caplog.text.count("calibrated") == 1
@@ -176,10 +176,10 @@ def test_a_new_model_knows_the_actor_at_rest_as_well(path, take, models, caplog)
         model.step(first), model.step(second), model.prepare()
         replaced(path, models / "second.safetensors")
         until(lambda: model.step(second) and "new model is in use" in caplog.text)
-        said = model.step(second).params
+        pose = model.step(second).params
     stream = facert.load(models / "second.safetensors").stream(take.source.names, take.fps)
-    np.testing.assert_allclose(said, stream.step(neutral).params, atol=1e-9)
-    assert np.abs(said - stream.step(neutral + 1.0).params).max() > 0.05
+    np.testing.assert_allclose(pose, stream.step(neutral).params, atol=1e-9)
+    assert np.abs(pose - stream.step(neutral + 1.0).params).max() > 0.05
 
 
 def test_a_new_model_goes_on_at_the_rate_that_was_measured(models, path, take):

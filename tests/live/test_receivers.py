@@ -12,7 +12,7 @@ from facert.live.endpoints import Address, open_receiver
 from facert.live.frames import frame_pattern
 from facert.live.livelink_packets import PACKET_NAMES
 from facert.live.osc import message
-from facert.live.receivers import TOLD, TakeReceiver
+from facert.live.receivers import LOGGED, TakeReceiver
 
 
 def test_frames_come_in_order_with_their_values_and_times(receiver, phone, collect):
@@ -63,8 +63,8 @@ def test_the_first_bad_packets_are_told_about_with_reason_and_sender(receiver, p
         phone.send(b"no face")
     while receiver.counters.bad < 100:
         receiver.wait(5.0)
-    said = "bad packet of 7 bytes from 127.0.0.1: not Live Link Face"
-    assert caplog.text.count(said) == TOLD
+    line = "bad packet of 7 bytes from 127.0.0.1: not Live Link Face"
+    assert caplog.text.count(line) == LOGGED
     assert caplog.text.count("only counted") == 1
 
 

@@ -1,9 +1,9 @@
-"""The actor at rest, told from the first seconds."""
+"""The actor at rest, found in the first seconds."""
 
 import numpy as np
 
 from facert.live.frames import Frame
-from facert.live.rest import RestWatch
+from facert.live.opening import RestWatch
 from facert.preprocess.live_faults import MarkerWatch
 
 

@@ -37,12 +37,12 @@ def test_each_pose_arrives_with_its_time(listener):
         assert found == pytest.approx(expected)
 
 
-def test_that_nobody_listens_is_counted_and_told_about_once(listener, caplog):
+def test_that_nobody_listens_is_counted_and_reported_once(listener, caplog):
     port = listener.getsockname()[1]
     listener.close()
     counters = send(port, *[[0.5, 0.5]] * 20)
     assert counters.unsent == 0
-    assert 0 < counters.unheard < 20
+    assert 0 < counters.refused < 20
     assert caplog.text.count(f"nobody listens on 127.0.0.1:{port}") == 1
 
 
@@ -62,7 +62,7 @@ def test_who_listens_later_misses_nothing_from_then_on(listener):
     sender.close()
 
 
-def test_what_the_system_will_not_send_is_counted_and_told_about_once(caplog):
+def test_what_the_system_will_not_send_is_counted_and_reported_once(caplog):
     names = [f"{index}{'x' * 70_000}" for index in range(2)]
     assert send(9, [0.0, 0.0], [1.0, 1.0], names=names).unsent == 4
     assert caplog.text.count("are lost") == 1

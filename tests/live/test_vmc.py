@@ -10,8 +10,7 @@ from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from facert.live.frames import BadPacketError, Observed
-from facert.live.osc import message, parse
-from facert.live.osc_layout import MOST_ALIKE, MOST_LENGTHS, PacketTemplates
+from facert.live.osc import MOST_ALIKE, MOST_LENGTHS, PacketTemplates, message, parse
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 NAMES = ("jawOpen", "mouthSmileLeft", "Brow Up")

@@ -174,8 +174,7 @@ def _open_receiver(
 def _open_senders(
     stack: ExitStack, ends: Sequence[Address | File], controls: tuple[str, ...], receiver: Receiver
 ) -> list[UdpSender]:
-    from facert.live.echo import refuse_echo
-    from facert.live.endpoints import Address, open_sender
+    from facert.live.endpoints import Address, open_sender, refuse_echo
     from facert.live.receivers import UdpReceiver
 
     senders = []

@@ -18,7 +18,7 @@ from rich.live import Live
 from facert.cli.shared import console
 from facert.live.frames import Counters
 from facert.live.loop import LiveSession
-from facert.live.meter import RECENT, Pace
+from facert.live.timing import RECENT, Pace
 
 ON_TERMINAL = 0.25
 """Seconds between two status lines that replace each other."""
@@ -100,7 +100,7 @@ def _counts(counters: Counters) -> str:
         "without a face": counters.hidden,
         "without a pose": counters.failed,
         "not sent": counters.unsent,
-        "heard by nobody": counters.unheard,
+        "refused by the receiver": counters.refused,
     }
     return ", ".join([always, *(f"{count} {name}" for name, count in others.items() if count)])
 
