@@ -8,7 +8,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
-from facert.render.plots import CURVE, INK, TRUTH
+from facert.render.faces import INK
+from facert.render.plots import CURVE, TRUTH
 
 if TYPE_CHECKING:
     from viser import GuiUplotHandle, ViserServer
@@ -89,10 +90,3 @@ class Chart:
             legend=u.Legend(show=False),
             height=HEIGHT,
         )
-
-
-def most_varying(take: Take, count: int) -> list[int]:
-    """The controls that vary most in a take with poses, by their place."""
-    assert take.params is not None
-    spread = np.nanstd(take.params, axis=0)
-    return sorted(np.argsort(-spread, kind="stable")[:count].tolist())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.pages.charts import Chart, most_varying
+from facert.pages.charts import Chart
 from facert.pages.paint import Paint, Scale, skin
 from facert.pages.playback import Playback
 from facert.pages.server import complainer
@@ -17,6 +17,7 @@ from facert.pages.timeline import FrameList, Timeline
 from facert.pages.view_data import Performance, highest
 from facert.pages.worker import Worker
 from facert.render.faces import Face
+from facert.render.plots import most_varying
 
 if TYPE_CHECKING:
     from viser import ViserServer

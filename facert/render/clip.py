@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.render.faces import Face, frame_faces, require_same_length
-from facert.render.shade import Camera, shade
+from facert.render.faces import INK, Face, frame_faces, require_same_length
+from facert.render.shade import Camera
 
 PIXELS = 300
 CAPTION = 28
-INK = (58, 63, 71)
 _AT_ONCE = 8  # frames that are drawn in parallel
 
 Pixels = NDArray[np.uint8]
@@ -71,10 +70,9 @@ def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> 
 
 def _draw(face: Face, camera: Camera, pixels: int, vertices: FloatArray) -> Pixels:
     """One face on white."""
-    if np.isnan(vertices).any():
+    picture = face.picture(vertices, camera, pixels)
+    if picture is None:
         return np.full((pixels, pixels, 3), 255, dtype=np.uint8)
-    neutral = face.motion.neutral
-    picture = shade(vertices, neutral.faces, camera, pixels, neutral.colours)
     on_white = 1 + picture[..., 3:] * (picture[..., :3] - 1)
     return np.round(255 * on_white).astype(np.uint8)
 

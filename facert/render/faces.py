@@ -1,4 +1,4 @@
-"""Faces to look at: what moves on a picture, with its name, whatever file it came from."""
+"""Faces in motion with their names, from takes and rigs or mesh sequences, and frames to draw."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from facert.data.names import shape_drivers
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.render.shade import Camera, frame_mesh
+from facert.render.shade import Camera, frame_mesh, shade
 
 TURN = -0.22  # radians; seen a little from the side, a face has more shape
-_LOOKED_AT = 16  # frames that tell how much room a face needs
+_LOOKED_AT = 16  # frames that show how much room a face needs
 _MOST_ROOM = 1.3
-_SAMPLED = 100  # vertices that tell frames of a mesh from each other
+_SAMPLED = 100  # vertices that distinguish the frames of a mesh
+INK = "#3a3f47"  # of what is written and drawn beside faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +28,16 @@ class Face:
     label: str
     motion: MeshSequence
 
+    def picture(self, vertices: FloatArray, camera: Camera, pixels: int) -> FloatArray | None:
+        """The face with these vertices (V, 3), RGBA (pixels, pixels, 4); None if any is NaN."""
+        if np.isnan(vertices).any():
+            return None
+        neutral = self.motion.neutral
+        return shade(vertices, neutral.faces, camera, pixels, neutral.colours)
+
 
 def frame_faces(faces: Sequence[Face], frames: Sequence[int]) -> list[Camera]:
-    """A view of each face, the same for all frames, that shows where it goes in most of them.
+    """A camera for each face, the same for all frames, that shows where it goes in most of them.
 
     Each is as large as its neutral allows; all shrink alike when one needs more room, so that
     faces beside each other stay comparable.
@@ -59,6 +67,50 @@ def posed_face(take: Take, rig: Rig, label: str) -> Face:
         return rig.deform(settings[frames])
 
     return Face(label, MeshSequence(rig.mesh, take.time, fetch, take.fps))
+
+
+def actor_face(take: Take, rig: Rig) -> Face:
+    """The face of an actor whose weights were tracked; a weight that is hidden counts as 0.
+
+    Raises
+    ------
+    InputError
+        When the rig has a shape for none of the weights, see `facert.data.names.shape_drivers`.
+    """
+    known = [name for name in take.source.names if drives(rig, [name])]
+    if not known:
+        raise _misfit("shapes for the take's weights", f"none for {take.source.names[0]!r}")
+    columns = [take.source.names.index(name) for name in known]
+    weights = np.nan_to_num(take.source.values[:, columns]) @ shape_drivers(known, rig.names)
+    motion = MeshSequence(rig.mesh, take.time, lambda rows: rig.deform(weights[rows]), take.fps)
+    return Face("actor", motion)
+
+
+def drives(rig: Rig, names: Sequence[str]) -> bool:
+    """Whether a rig has a shape, or its two halves, for every name."""
+    try:
+        shape_drivers(names, rig.names)
+    except InputError:
+        return False
+    return True
+
+
+def require_drawable(take: Take, rig: Rig | None) -> None:
+    """Check that there is a rig to draw a take of weights, and none for markers.
+
+    Raises
+    ------
+    InputError
+        When there is not.
+    """
+    if take.source.kind == "markers" and rig is not None:
+        raise _misfit("a take of weights", "a take of markers")
+    if take.source.kind == "weights" and rig is None:
+        raise _misfit("the actor's rig, for a take of weights", "none")
+
+
+def _misfit(expected: str, found: str) -> InputError:
+    return InputError("--rig", expected, found, "Give the rig that fits, or none for markers.")
 
 
 def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
@@ -91,7 +143,7 @@ def require_poses(take: Take) -> FloatArray:
 
 
 def outline(motion: MeshSequence) -> FloatArray:
-    """Every frame in short, (T, D): where some of its vertices are."""
+    """Positions of some vertices in every frame, (T, D): enough to compare frames."""
     vertices = len(motion.neutral.vertices)
     chosen = np.arange(0, vertices, max(1, vertices // _SAMPLED))
     parts = [batch[:, chosen].reshape(len(batch), -1) for batch in motion.batches()]

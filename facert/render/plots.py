@@ -9,13 +9,13 @@ import numpy as np
 
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.render.faces import require_poses
+from facert.render.faces import INK, require_poses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CURVE, TRUTH, INK = "#1f6f8b", "#c9a26b", "#3a3f47"
+CURVE, TRUTH = "#1f6f8b", "#c9a26b"
 MOST = 8  # curves, if none are named
 MAX_CURVES = 40
 
@@ -50,14 +50,16 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
         raise InputError(
             "--controls", f"at most {MAX_CURVES} names", f"{len(names)}", "Draw several pictures."
         )
-    names = tuple(names) or _most_varying(take)
-    figure = Figure(figsize=(10, 1.05 * len(names) + 0.7), dpi=150, layout="constrained")
-    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, name in zip(grid, names, strict=True):
+    columns = [_column(take, name) for name in names] or most_varying(take, MOST)
+    figure = Figure(figsize=(10, 1.05 * len(columns) + 0.7), dpi=150, layout="constrained")
+    grid = figure.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
+    assert take.controls is not None  # poses come with controls
+    for axes, column in zip(grid, columns, strict=True):
+        name = take.controls.names[column]
         if truth is not None:
             values = require_poses(truth)[:, _column(truth, name)]
             axes.plot(truth.time, values, color=TRUTH, linewidth=2.4, label="truth")
-        _draw_curve(axes, take, name)
+        _draw_curve(axes, take, column)
         _tidy(axes, name)
     grid[-1].set_xlabel("seconds", color=INK)
     if truth is not None or take.std is not None:
@@ -65,8 +67,7 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
     return figure
 
 
-def _draw_curve(axes: Axes, take: Take, name: str) -> None:
-    column = _column(take, name)
+def _draw_curve(axes: Axes, take: Take, column: int) -> None:
     values = require_poses(take)[:, column]
     if take.std is not None:
         band = 2 * take.std[:, column]
@@ -87,12 +88,10 @@ def _tidy(axes: Axes, name: str) -> None:
     axes.tick_params(colors=INK, labelsize=8)
 
 
-def _most_varying(take: Take) -> tuple[str, ...]:
-    poses, controls = require_poses(take), take.controls
-    assert controls is not None  # poses come with controls
-    spread = poses[take.labels].std(axis=0)
-    chosen = np.sort(np.argsort(-spread, kind="stable")[:MOST])
-    return tuple(controls.names[index] for index in chosen)
+def most_varying(take: Take, count: int) -> list[int]:
+    """Indices of the controls that vary most over the posed frames, rising."""
+    spread = require_poses(take)[take.labels].std(axis=0)
+    return sorted(np.argsort(-spread, kind="stable")[:count].tolist())
 
 
 def _column(take: Take, name: str) -> int:

@@ -1,54 +1,39 @@
-"""A sheet of pictures: frames from left to right, the markers and each face in a row."""
+"""Sheets of pictures: rows of faces, contact sheets of an actor, and feature points on a face."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data.rig import Rig
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.rig import Mesh, Rig
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.render.faces import Face, frame_faces, posed_face, require_same_length
-from facert.render.shade import Camera, shade
+from facert.render.faces import (
+    INK,
+    Face,
+    actor_face,
+    frame_faces,
+    require_drawable,
+    require_same_length,
+)
+from facert.render.shade import Camera, frame_mesh, shade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CELL = 2.2  # inches a picture
+CELL, HEADING = 2.2, 0.3  # inches of a picture, and above one of a contact sheet
 PIXELS = 320
-INK = "#3a3f47"
 MAX_FRAMES = 40
-
-
-def render_faces(take: Take, rig: Rig, frames: Sequence[int], truth: Take | None = None) -> Figure:
-    """Frames of a take side by side: its markers if it has any, the character, the truth.
-
-    Parameters
-    ----------
-    take : Take
-        With poses.
-    rig : Rig
-        The character; shapes and controls are matched by name.
-    frames : sequence of int
-    truth : Take, optional
-        A take with the same frames, whose poses make the last row.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        When names, frames or lengths do not fit together.
-    """
-    faces = [posed_face(take, rig, "character")]
-    if truth is not None:
-        faces.append(posed_face(truth, rig, "truth"))
-    return render_sheet(faces, frames, take)
+ACROSS = 5  # least pictures in a row of a contact sheet, if there are so many
+WIDE = 1.6  # width of a large contact sheet over its height
+TURNS = (0.0, -0.9)  # radians, of a face with points: from the front, and from the side
+_POINT = "#b3261e"
+_POINTS_INCHES, _POINTS_RESOLUTION = 4.5, 150
 
 
 def render_sheet(
@@ -66,10 +51,6 @@ def render_sheet(
     pixels : int
         Width and height of a picture.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
     Raises
     ------
     InputError
@@ -86,12 +67,89 @@ def render_sheet(
     for axes, time in zip(grid[0], faces[0].motion.time[frames], strict=True):
         axes.set_title(f"{time:.2f} s", fontsize=9, color=INK)
     if take is not None and with_markers:
-        _draw_markers(grid[0], take, frames)
+        _draw_markers(grid[0], take.source.values, frames, 0.58)
+        _label(grid[0, 0], "markers")
     cameras = frame_faces(faces, frames)
     for line, face, camera in zip(grid[int(with_markers) :], faces, cameras, strict=True):
         _draw_face(line, face, camera, frames, pixels)
         _label(line[0], face.label)
     for axes in grid.flat:
+        axes.set_axis_off()
+    return figure
+
+
+def contact_sheet(
+    take: Take, frames: Sequence[int], headings: Sequence[str], rig: Rig | None = None
+) -> Figure:
+    """The actor in some frames, from the front: as markers, or as the face that weights drive.
+
+    Parameters
+    ----------
+    take : Take
+    frames : sequence of int
+    headings : sequence of str
+        One a frame.
+    rig : Rig, optional
+        The actor's, for a take of weights: a shape, or its left and right half, for each that the
+        take and the rig have in common.
+
+    Raises
+    ------
+    InputError
+        When there are too many frames, or a take of weights comes without a rig, or markers with
+        one.
+    """
+    from matplotlib.figure import Figure
+
+    require_drawable(take, rig)
+    frames = checked_frames(frames, len(take))
+    width = min(len(frames), max(ACROSS, math.ceil(math.sqrt(WIDE * len(frames)))))
+    height = -(-len(frames) // width)
+    figure = Figure((CELL * width, (CELL + HEADING) * height), dpi=PIXELS / CELL)
+    grid = list(figure.subplots(height, width, squeeze=False).flat)
+    margin = 0.75 * HEADING / ((CELL + HEADING) * height)
+    figure.subplots_adjust(0, 0, 1, 1 - margin, wspace=0.02, hspace=HEADING / CELL)
+    for axes in grid:
+        axes.set_axis_off()
+    if rig is None:
+        _draw_markers(grid, take.source.values, frames, 0.55, rings=True)
+    else:
+        face = actor_face(take, rig)
+        _draw_face(grid, face, frame_faces([face], frames)[0], frames, PIXELS)
+    for axes, heading in zip(grid, headings, strict=False):
+        axes.set_title(heading, fontsize=9, color=INK, pad=3)
+    return figure
+
+
+def draw_points(mesh: Mesh, vertices: IntArray) -> Figure:
+    """A face from the front and from the side, with the place of each point among them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    vertices : array of int, shape (M,)
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_POINTS_INCHES * len(TURNS), _POINTS_INCHES), dpi=_POINTS_RESOLUTION)
+    size = round(_POINTS_INCHES * _POINTS_RESOLUTION)
+    grid = figure.subplots(1, len(TURNS))
+    figure.subplots_adjust(0, 0, 1, 1, wspace=0)
+    for axes, turn in zip(grid, TURNS, strict=True):
+        camera = frame_mesh(mesh.vertices, turn)
+        axes.imshow(shade(mesh.vertices, mesh.faces, camera, size, mesh.colours))
+        column, row, depth = camera.project(mesh.vertices, size)[vertices].T
+        for place in np.argsort(depth):  # nearer ones over farther ones
+            axes.plot(column[place], row[place], "o", ms=4, color=_POINT, mec="white", mew=0.5)
+            axes.annotate(
+                str(place + 1),
+                (column[place], row[place]),
+                (3, 2),
+                "data",
+                "offset points",
+                fontsize=5,
+                color=_POINT,
+            )
         axes.set_axis_off()
     return figure
 
@@ -119,44 +177,48 @@ def checked_frames(frames: Sequence[int], length: int) -> list[int]:
     return list(frames)
 
 
-def _draw_markers(line: Sequence[Axes], take: Take, frames: Sequence[int]) -> None:
-    """Markers from the front; nearer ones are darker."""
-    markers = take.source.values
+def _draw_markers(
+    cells: Sequence[Axes],
+    markers: FloatArray,
+    frames: Sequence[int],
+    room: float,
+    rings: bool = False,
+) -> None:
+    """Markers (T, M, 3) from the front; nearer ones are darker.
+
+    `room` is half the height shown, in their largest extent. With `rings`, lines come from hollow
+    rings where each marker mostly is.
+    """
+    markers = markers[:, ~np.isnan(markers).all(axis=(0, 2))]
+    rest = np.nanmedian(markers, axis=0)
     low, high = (bound(markers, axis=(0, 1)) for bound in (np.nanmin, np.nanmax))
-    middle, reach = (low + high) / 2, 0.58 * max(float((high - low)[:2].max()), 1e-9)
-    for axes, frame in zip(line, frames, strict=True):
+    middle, reach = (low + high) / 2, room * max(float((high - low)[:2].max()), 1e-9)
+    for axes, frame in zip(cells, frames, strict=False):
+        if rings:
+            lines = np.stack([rest, markers[frame]], axis=1).T[:2]
+            axes.plot(*lines, color=INK, lw=0.6, alpha=0.6)
+            axes.scatter(rest[:, 0], rest[:, 1], s=6, facecolors="none", edgecolors=INK, lw=0.4)
         x, y, z = markers[frame].T
         axes.scatter(x, y, s=13, c=z, cmap="GnBu", vmin=low[2] - (high - low)[2], vmax=high[2])
         axes.set_xlim(middle[0] - reach, middle[0] + reach)
         axes.set_ylim(middle[1] - reach, middle[1] + reach)
         axes.set_aspect("equal")
-    _label(line[0], "markers")
 
 
 def _draw_face(
-    line: Sequence[Axes], face: Face, camera: Camera, frames: Sequence[int], pixels: int
+    cells: Sequence[Axes], face: Face, camera: Camera, frames: Sequence[int], pixels: int
 ) -> None:
-    neutral = face.motion.neutral
-    for axes, frame in zip(line, frames, strict=True):
-        vertices = face.motion.fetch(np.array([frame]))[0]
-        if np.isnan(vertices).any():
+    for axes, frame in zip(cells, frames, strict=False):
+        picture = face.picture(face.motion.fetch(np.array([frame]))[0], camera, pixels)
+        if picture is None:
             axes.text(0.5, 0.5, "no pose", ha="center", color=INK, transform=axes.transAxes)
-            continue
-        axes.imshow(shade(vertices, neutral.faces, camera, pixels, neutral.colours))
+        else:
+            axes.imshow(picture)
 
 
 def _label(axes: Axes, text: str) -> None:
-    axes.text(
-        -0.04,
-        0.5,
-        text,
-        rotation=90,
-        ha="right",
-        va="center",
-        fontsize=10,
-        color=INK,
-        transform=axes.transAxes,
-    )
+    style = {"rotation": 90, "ha": "right", "va": "center", "fontsize": 10, "color": INK}
+    axes.text(-0.04, 0.5, text, style, transform=axes.transAxes)
 
 
 def _margins(figure: Figure) -> dict[str, float]:

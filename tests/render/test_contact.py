@@ -8,7 +8,8 @@ import pytest
 from facert.data.rig import Rig
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.render.contact import actor_face, contact_sheet
+from facert.render.faces import actor_face
+from facert.render.sheet import contact_sheet
 
 VERTICES = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 SHAPES = np.stack([VERTICES * 0.5, -VERTICES * 0.1])

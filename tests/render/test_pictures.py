@@ -13,11 +13,11 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.mesh.normals import vertex_normals
-from facert.render.faces import choose_frames, control_settings
+from facert.render.faces import choose_frames, control_settings, posed_face
 from facert.render.plots import plot_controls
 from facert.render.raster import rasterise
 from facert.render.shade import Camera, frame_mesh, shade
-from facert.render.sheet import render_faces
+from facert.render.sheet import render_sheet
 
 SQUARE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 FRONT = np.array([[0, 1, 2], [0, 2, 3]])
@@ -36,6 +36,7 @@ def take_with(params: np.ndarray, names: tuple[str, ...] = ("up", "wide")) -> Ta
 
 RIG = Rig(SQUARE, np.stack([SQUARE * [0, 1, 0], SQUARE * [1, 0, 0]]), ("up", "wide"), FRONT)
 TAKE = take_with(np.random.default_rng(1).uniform(size=(20, 2)))
+FACE = posed_face(TAKE, RIG, "character")
 
 
 def test_a_square_covers_its_share_of_the_picture() -> None:
@@ -118,28 +119,28 @@ def test_an_unknown_control_is_named_with_a_hint() -> None:
 
 
 def test_faces_have_a_row_each_for_markers_character_and_truth() -> None:
-    assert len(render_faces(TAKE, RIG, [5], TAKE).axes) == 3
+    assert len(render_sheet([FACE, FACE], [5], TAKE).axes) == 3
     weights = dataclasses.replace(TAKE, source=Source(np.ones((20, 2)), ("a", "b")))
-    assert len(render_faces(weights, RIG, [5]).axes) == 1
+    assert len(render_sheet([FACE], [5], weights).axes) == 1
 
 
 def test_a_frame_without_a_pose_says_so() -> None:
     assert TAKE.params is not None
     params = TAKE.params.copy()
     params[3] = np.nan
-    figure = render_faces(take_with(params), RIG, [3])
-    assert "no pose" in [text.get_text() for text in figure.axes[1].texts]
+    figure = render_sheet([posed_face(take_with(params), RIG, "character")], [3])
+    assert "no pose" in [text.get_text() for text in figure.axes[0].texts]
 
 
 @pytest.mark.parametrize("frames", [[20], [-1], []])
 def test_frames_must_exist(frames: list[int]) -> None:
     with pytest.raises(InputError, match="--frames"):
-        render_faces(TAKE, RIG, frames)
+        render_sheet([FACE], frames)
 
 
 def test_the_truth_must_have_the_same_frames() -> None:
     with pytest.raises(InputError, match="--truth"):
-        render_faces(TAKE, RIG, [0], take_with(np.ones((3, 2))))
+        render_sheet([FACE, posed_face(take_with(np.ones((3, 2))), RIG, "truth")], [0])
 
 
 def test_the_most_varying_controls_are_plotted() -> None:
@@ -174,7 +175,7 @@ def test_nothing_to_plot_without_poses() -> None:
 
 def test_a_take_whose_frames_all_lack_a_pose_is_not_drawn() -> None:
     empty = take_with(np.full((20, 2), np.nan))
-    for draw in (lambda: plot_controls(empty), lambda: render_faces(empty, RIG, [0])):
+    for draw in (lambda: plot_controls(empty), lambda: posed_face(empty, RIG, "character")):
         with pytest.raises(InputError, match="/target/params"):
             draw()
 
@@ -183,4 +184,4 @@ def test_a_picture_has_its_bounds() -> None:
     with pytest.raises(InputError, match="--controls: expected at most 40"):
         plot_controls(TAKE, names=["up"] * 41)
     with pytest.raises(InputError, match="--frames: expected at most 40"):
-        render_faces(TAKE, RIG, [0] * 41)
+        render_sheet([FACE], [0] * 41)

@@ -45,7 +45,7 @@ def suggest(
     from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
-    from facert.render.points import draw_points
+    from facert.render.sheet import draw_points
     from facert.topology.suggestion import suggest_points
 
     if picture is not None:

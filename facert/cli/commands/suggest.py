@@ -55,8 +55,8 @@ def command(
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.posing.suggestion import suggest_frames
-    from facert.render.contact import contact_sheet, require_drawable
-    from facert.render.sheet import MAX_FRAMES
+    from facert.render.faces import require_drawable
+    from facert.render.sheet import MAX_FRAMES, contact_sheet
 
     if rig_path is not None and sheet is None:
         raise typer.BadParameter("--rig is for the sheet: give --sheet as well")

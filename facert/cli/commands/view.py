@@ -88,7 +88,7 @@ def actor_of(take: Take, path: Path | None, shapes: str | None) -> Face | None:
         When the take holds markers, or the rig has a shape for none of the weights.
     """
     from facert.io.formats import read_rig_file
-    from facert.render.contact import actor_face
+    from facert.render.faces import actor_face
 
     if path is None:
         return None

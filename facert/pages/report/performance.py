@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.data.shared_controls import SharedControls, require_shared, shared_controls
 from facert.data.take import Take
 from facert.data.text import plural
-from facert.errors import InputError
 from facert.evaluation.metrics import Comparison, compare
 from facert.pages.report.pictures import embedded
 from facert.pages.report.sections import Fact, Picture, Section, Table
-from facert.render.faces import choose_frames, posed_face, require_poses
+from facert.render.faces import choose_frames, drives, posed_face, require_poses
 from facert.render.plots import plot_controls
 from facert.render.sheet import render_sheet
 
@@ -59,13 +57,7 @@ def performance_section(
 
 def fits(rig: Rig, take: Take) -> bool:
     """Whether a rig has a shape for every control of a take."""
-    if take.controls is None:
-        return False
-    try:
-        shape_drivers(take.controls.names, rig.names)
-    except InputError:
-        return False
-    return True
+    return take.controls is not None and drives(rig, take.controls.names)
 
 
 def truth_among(known: Sequence[Take], take: Take) -> Take | None:
