@@ -32,6 +32,7 @@ from facert.preprocess.known_poses import Given, KnownPoses
 
 NEAR = 8.0  # γ
 ANYWHERE = 0.3  # ε: a few near poses may agree by chance
+STILL = 1e-13  # share of the largest variance: below, known poses do not vary along a direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,10 +137,11 @@ class Completion:
             return values, np.zeros((0, len(values)))
         known = self.known.poses[:, self.given]
         mean, C = known.mean(axis=0), np.atleast_2d(np.cov(known, rowvar=False))
-        gain = np.linalg.solve(C + given.soft**2 * np.eye(len(C)), C).T
-        variances, directions = np.linalg.eigh(C - gain @ C)
-        roots = (directions * np.sqrt(np.maximum(variances, 0.0) * len(C))).T
-        likely = mean + gain @ (values - mean)
+        variances, directions = np.linalg.eigh(C)
+        variances[variances <= STILL * variances.max()] = 0.0
+        shares = variances / (variances + given.soft**2)
+        roots = (directions * np.sqrt(shares * given.soft**2 * len(C))).T
+        likely = mean + directions @ (shares * (directions.T @ (values - mean)))
         return np.clip(likely, *self.known.bounds[self.given].T), roots
 
     def _nearby(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:

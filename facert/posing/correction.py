@@ -26,6 +26,8 @@ from facert.preprocess.known_poses import Given, KnownPoses
 
 SEEN = 0.1
 RIDGE = 1e-9  # relative to the mean variance of a control
+LEAST = 1e-24  # variance, where no control varies
+CERTAIN = 1e-13  # share of the largest error variance: below, a control has no error to correct
 
 
 def correct(
@@ -56,7 +58,7 @@ def correct(
     """
     G, E = given.controls, _error_covariance(known.poses, std)
     seen = E[np.ix_(G, G)] + given.soft**2 * np.eye(len(G))
-    gain = np.linalg.solve(seen, E[G]).T
+    gain = E[:, G] @ np.linalg.pinv(seen, rcond=CERTAIN, hermitian=True)
     pose = start + gain @ (given.values - start[G])
     left = E - gain @ E[G]
     variances, directions = np.linalg.eigh((left + left.T) / 2.0)
@@ -79,7 +81,7 @@ def _fix(posed: Posed, controls: IntArray, values: FloatArray) -> None:
 def _error_covariance(poses: FloatArray, std: FloatArray | None) -> FloatArray:
     """E, (P, P)."""
     C = np.atleast_2d(np.cov(poses, rowvar=False))
-    C[np.diag_indices_from(C)] += RIDGE * np.trace(C) / len(C)
+    C[np.diag_indices_from(C)] += max(RIDGE * np.trace(C) / len(C), LEAST)
     S = C - C @ np.linalg.solve(C + SEEN * np.diag(C.diagonal()), C)
     if std is None:
         return S

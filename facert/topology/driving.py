@@ -22,9 +22,9 @@ from facert.errors import InputError
 from facert.topology import laplacian
 from facert.topology.alignment import alignment_matrix
 from facert.topology.followers import Follower, followers
-from facert.topology.interpolation import Kernel, radial_basis
 from facert.topology.labels import checked_labels, lacking_components, require_enough_labels
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings
+from facert.topology.radial_basis import Kernel, radial_basis
 from facert.topology.solution import Dense, Elimination, Interpolant
 
 SURFACE = 2  # d

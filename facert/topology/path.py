@@ -22,7 +22,8 @@ from facert.topology.keyed import KeyedPerformance
 MOST = 30.0  # τ where time tells all
 BALANCE = 0.2  # times what a linear map misses: where time is trusted half as much
 STEEPNESS = 6
-RANK = 1e-13  # of the covariance: its null vector is the constant
+RANK = 1e-15  # share of the largest stiffness: less is rounding
+FARTHEST = 1e13  # ratio beyond which time surely tells nothing
 
 
 class SmoothPath:
@@ -62,8 +63,11 @@ class SmoothPath:
 
         Rows add up to 0, so do the rows of the keys, and the mean variance of the keys is 1.
         """
-        centre = np.eye(len(self.stiffness)) - 1.0 / len(self.stiffness)
-        between_keys = centre @ np.linalg.pinv(self.stiffness, rcond=RANK, hermitian=True) @ centre
+        stiffness, paths = np.linalg.eigh(self.stiffness)
+        paths -= paths.mean(axis=0)
+        # S⁺ without the first path, the constant, which alone bends nothing: S has rank K - 1.
+        bent = np.maximum(stiffness[1:], RANK * stiffness[-1])
+        between_keys = (paths[:, 1:] / bent) @ paths[:, 1:].T
         return np.asarray(self.influence @ between_keys / between_keys.diagonal().mean())
 
     def missed(self, take: KeyedPerformance) -> float:
@@ -87,4 +91,4 @@ def trust_in_path(by_path: float, by_map: float) -> float:
     if by_map <= 0:
         return 0.0
     ratio = by_path / (BALANCE * by_map)
-    return float(MOST / (1.0 + ratio**STEEPNESS)) if ratio < 1.0 / RANK else 0.0
+    return float(MOST / (1.0 + ratio**STEEPNESS)) if ratio < FARTHEST else 0.0

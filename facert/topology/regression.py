@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
+from facert.mesh.rigid import align
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.path import SmoothPath, trust_in_path
 
@@ -30,7 +31,7 @@ CURVATURES = (0.03, 0.3)  # κ
 BATCH = 256  # frames: for bounded memory
 LENGTH = 2.0  # ℓ, where two keys are √2 apart
 TRUST = 0.1  # in leave-one-out errors, a key: see _trusts
-TRACE = 1e-12  # of the motion: see scaled_source
+PULL = 1e-8  # towards no rotation: decides where the motion does not
 LEAST = 1e-12  # of what a key may weigh in its own prediction
 RANK = 1e-5  # least share of the largest singular value that is no rounding, in an affine map
 
@@ -66,12 +67,13 @@ def scaled_source(take: KeyedPerformance) -> FloatArray:
     power = float(np.sum(source**2))
     if power == 0:
         return np.zeros_like(take.source)
-    covariance = source.T @ target
-    # A trace of the identity decides where the motion does not.
-    U, _, Vt = np.linalg.svd(covariance + TRACE * np.linalg.norm(covariance) * np.eye(3))
-    U[:, 2] *= np.sign(np.linalg.det(U @ Vt))  # a rotation, never a mirror
-    rotation = U @ Vt
-    scale = float(np.sum(covariance * rotation)) / power
+    target_size = float(np.linalg.norm(target)) or 1.0
+    target, weights = np.sqrt(power) / target_size * target, np.ones((1, len(source)))
+    # From the best rotation but for the pull, the pull bends nothing that the motion determines.
+    first = align(source, target[None], weights, PULL)
+    motion = align(first.apply(source)[0], target[None], weights, PULL).after(first)
+    rotation = motion.rotations[0].T
+    scale = target_size / np.sqrt(power) * float(np.sum((source @ rotation) * target)) / power
     return np.asarray(scale * take.source @ rotation)
 
 

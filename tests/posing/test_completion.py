@@ -141,6 +141,17 @@ def test_soft_values_lie_between_what_was_asked_and_what_is_likely(known, comple
     assert (loose.std[G] > soft.std[G]).all()
 
 
+def test_soft_values_of_controls_that_go_together_do_not_depend_on_rounding(known):
+    rng = np.random.default_rng(0)
+    poses = rng.normal(size=(50, 2)) @ rng.normal(size=(2, 7))
+    given = np.arange(5)
+    together = Completion.learn(KnownPoses(poses, np.tile([-9.0, 9.0], (7, 1))), given)
+    firm, firmer = (
+        together.pose(Given(given, poses[3, given] + 0.01, soft), 0, rng) for soft in (1e-6, 1e-10)
+    )
+    np.testing.assert_allclose(firm.pose, firmer.pose, atol=1e-6)
+
+
 def test_samples_of_soft_values_keep_to_the_limits(known, completion):
     given = Given(G, np.array([0.98, 0.02, 0.5]), 0.3)
     samples = completion.pose(given, 200, np.random.default_rng(0)).samples

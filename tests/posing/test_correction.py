@@ -41,6 +41,20 @@ def test_the_corrections_are_met_and_mend_the_others(world):
     assert rms(done[:, rest] - truth[:, rest]) < 0.7 * rms(said[:, rest] - truth[:, rest])
 
 
+@pytest.mark.parametrize("std", [None, np.full(P, 0.1)])
+def test_where_no_known_pose_moves_the_others_stay(world, std):
+    start = world[1][0]
+    moved = corrected(KnownPoses(np.tile(start, (5, 1)), FREE), start, start[G] + 0.1, std=std)
+    np.testing.assert_allclose(moved.pose - start, 0.1 * np.isin(np.arange(P), G), atol=1e-12)
+
+
+def test_a_control_without_error_moves_no_other(world):
+    known, _, said = world
+    certain = np.where(np.isin(np.arange(P), G), 0.0, 0.1)
+    moved = corrected(known, said[0], said[0, G] + 0.1, std=certain).pose - said[0]
+    np.testing.assert_allclose(moved, 0.1 * np.isin(np.arange(P), G), atol=1e-12)
+
+
 def test_twice_the_correction_moves_the_others_twice_as_far(world):
     known, _, said = world
     once, twice = (

@@ -7,6 +7,7 @@ from scipy.interpolate import CubicSpline, RBFInterpolator
 from facert.errors import InputError
 from facert.topology.keyed import KeyedPerformance, even_keys
 from facert.topology.propagation import METHODS, propagate
+from facert.topology.radial_basis import radial_basis
 from facert.topology.regression import PENALTIES, _dual_weights, scaled_source
 
 FREE_OF_SPACE = [name for name in METHODS if name not in ("laplacian", "affine", "rbf-thin-plate")]
@@ -135,6 +136,19 @@ def test_the_baselines_are_the_ones_of_scipy():
         X = take.source[:, 3]
         expected = RBFInterpolator(X[take.keys], take.labels[:, 3], kernel=kernel)(X)
         np.testing.assert_allclose(propagate(take, name)[:, 3], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("kernel", ["linear", "thin_plate_spline"])
+@pytest.mark.parametrize("span", [1, 2, 21])
+def test_labels_in_a_line_or_a_plane_determine_a_radial_interpolation(kernel, span):
+    rng = np.random.default_rng(span)
+    X, values = rng.normal(size=(60, 21)), rng.normal(size=(22, 3))
+    flat, _ = np.linalg.qr(rng.normal(size=(21, span)))
+    X[:22] = X[:22] @ flat @ flat.T
+    interpolated = radial_basis(X, np.arange(22), kernel)(values)
+    np.testing.assert_allclose(interpolated[:22], values, atol=1e-8)
+    moved = radial_basis(1e3 * X + 7.0, np.arange(22), kernel)(values)
+    np.testing.assert_allclose(moved, interpolated, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["residual", "path", "laplacian", "ridge", "affine", "spline"])
