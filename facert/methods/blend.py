@@ -32,11 +32,11 @@ from scipy.optimize import nnls
 from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray, rms
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.factors import FactorMap, Trio, left_out_poses
-from facert.methods.one_frame import BlendFrame
-from facert.methods.regression import Map, Regression
+from facert.methods.factors import FactorMap
+from facert.methods.folds import ranked_folds
+from facert.methods.processes import Basis, FeatureProcess, ProcessBank
+from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
-from facert.methods.ssgpr import Basis, FeatureProcess
 
 TOGETHER = 0.3  # ρ
 FAULTLESS = 1e-9  # least E, relative to the squared error of the worst expert
@@ -91,30 +91,103 @@ class BlendMap(Map):
     shrinkage: Shrinkage
     residual_shrinkage: Shrinkage
 
-    def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
         """Poses of frames X (T, d_x), (T, d_y); the variance is the experts', weighted alike."""
-        plain, whitened, factors, missed = (
-            part(X) for part in (self.plain, self.whitened, self.factors, self.residual)
-        )
-        said = self._clip(factors[0])
-        poses = [
-            plain[0],
-            whitened[0],
-            self.shrinkage(said),
-            self.residual_shrinkage(self._clip(said + missed[0])),
-        ]
-        doubt = np.broadcast_to(self.doubt, said.shape)
-        variances = [std**2 for std in (plain[1], whitened[1], doubt, missed[1])]
-        pose = np.tensordot(self.weights, np.array([self._clip(p) for p in poses]), axes=1)
-        return pose, np.sqrt(np.tensordot(self.weights, np.array(variances), axes=1))
+        predicted, variances = self._bank(X)
+        poses = np.empty((len(self._used), *predicted.shape[1:]))
+        poses[:-2] = predicted[:-1]
+        factors = poses[-2:]  # without and with the process of their residual
+        factors[:] = self.factors(X)[0]
+        self._clip(factors)
+        factors[1] += predicted[-1]
+        self._clip(factors)
+        factors[:] = np.matmul(factors, self._matrices)
+        factors += self._offsets
+        self._clip(poses)
+        pose = self._used @ poses.reshape(len(poses), -1)
+        return pose.reshape(predicted.shape[1:]), lambda: self._variance(variances())
+
+    def _variance(self, of_processes: FloatArray) -> FloatArray:
+        """Variance of poses (T, d_y), from that of the processes in the bank, (p, T)."""
+        shares = np.delete(self._used, -2)
+        return np.asarray((shares @ of_processes)[:, None] + self.weights[2] * self.doubt**2)
 
     @cached_property
-    def for_frames(self) -> BlendFrame:
-        """The same for single frames."""
-        return BlendFrame(self)
+    def _direct(self) -> Sequence[int]:
+        """The experts with a weight that are nothing but a process."""
+        return [expert for expert in (0, 1) if self.weights[expert] > 0.0]
 
-    def _clip(self, poses: FloatArray) -> FloatArray:
-        return np.clip(poses, *self.range)
+    @cached_property
+    def _used(self) -> FloatArray:
+        """The weights of those, and of the factors without and with their residual."""
+        return np.asarray(self.weights[[*self._direct, 2, 3]])
+
+    @cached_property
+    def _bank(self) -> ProcessBank:
+        processes = [(self.plain, self.whitened)[expert] for expert in self._direct]
+        return ProcessBank([*processes, self.residual])
+
+    @cached_property
+    def _low(self) -> FloatArray:
+        return self.range[0]
+
+    @cached_property
+    def _high(self) -> FloatArray:
+        return self.range[1]
+
+    @cached_property
+    def _matrices(self) -> FloatArray:
+        return np.stack([self.shrinkage.matrix, self.residual_shrinkage.matrix])
+
+    @cached_property
+    def _offsets(self) -> FloatArray:
+        return np.stack([s.offset for s in (self.shrinkage, self.residual_shrinkage)])[:, None]
+
+    def _clip(self, poses: FloatArray) -> None:
+        np.maximum(poses, self._low, out=poses)
+        np.minimum(poses, self._high, out=poses)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMaps:
+    """Three maps learned from the same data: two processes, and the factors begun at them.
+
+    The search for the factors begins at the mean of what both processes predict: clean captures
+    want the one, real markers the other, and their mean serves all.
+    """
+
+    plain: FeatureProcess
+    whitened: FeatureProcess
+    factors: FactorMap
+
+    @classmethod
+    def learn(cls, labelled: Labelled, unlabelled: Unlabelled) -> BaseMaps:
+        """The maps of labelled frames, frames and poses."""
+        frames = np.vstack([labelled.X, unlabelled.X])
+        mean = np.vstack([labelled.Y, unlabelled.Y]).mean(axis=0)
+        plain = FeatureProcess.learn(labelled, Basis.plain(frames), mean)
+        whitened = FeatureProcess.learn(labelled, Basis.half_whitened(frames), mean)
+        guess = (plain(unlabelled.X)[0] + whitened(unlabelled.X)[0]) / 2.0
+        return cls(plain, whitened, FactorMap.learn(labelled, unlabelled, guess))
+
+    def __call__(self, X: FloatArray) -> FloatArray:
+        """Poses of frames X (T, d_x) by each map, (3, T, d_y)."""
+        return np.array([map_(X)[0] for map_ in (self.plain, self.whitened, self.factors)])
+
+
+def cross_validated_poses(labelled: Labelled, unlabelled: Unlabelled) -> FloatArray:
+    """Poses that each of the base maps predicts for labels that it was not given, (3, l, d_y).
+
+    No closed form gives what factors would predict for a label left out: they are learned five
+    times more, each time without the poses of a fifth of the labels, and the processes with them.
+    """
+    predicted = np.empty((3, *labelled.Y.shape))
+    for train, test in ranked_folds(labelled.X):
+        rest = Labelled(labelled.X[train], labelled.Y[train])
+        frames = np.vstack([unlabelled.X, labelled.X[test]])
+        maps = BaseMaps.learn(rest, Unlabelled(frames, unlabelled.Y))
+        predicted[:, test] = maps(labelled.X[test])
+    return predicted
 
 
 class Auto(Regression):
@@ -128,10 +201,10 @@ class Auto(Regression):
         poses, Y = np.vstack([labelled.Y, unlabelled.Y]), labelled.Y
         bounds = _bounds(unlabelled, poses)
         some = _fewer_poses(unlabelled, self.settings.seed)
-        trio = Trio.learn(labelled, some)
-        plain, whitened, factors = np.clip(left_out_poses(labelled, some), *bounds)
+        maps = BaseMaps.learn(labelled, some)
+        plain, whitened, factors = np.clip(cross_validated_poses(labelled, some), *bounds)
 
-        basis = Basis(trio.whitened.centre, trio.whitened.basis)
+        basis = Basis(maps.whitened.centre, maps.whitened.basis)
         missed = Labelled(labelled.X, Y - factors)
         residual = FeatureProcess.learn(missed, basis, np.zeros(Y.shape[1]))
         corrected = np.clip(Y - residual.process.left_out_errors, *bounds)
@@ -144,9 +217,9 @@ class Auto(Regression):
             weights=weights,
             range=bounds,
             doubt=np.sqrt(np.mean(errors[EXPERTS.index("factors")] ** 2, axis=0)),
-            plain=trio.plain,
-            whitened=trio.whitened,
-            factors=trio.factors,
+            plain=maps.plain,
+            whitened=maps.whitened,
+            factors=maps.factors,
             residual=residual,
             shrinkage=shrinkage,
             residual_shrinkage=residual_shrinkage,

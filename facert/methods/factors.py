@@ -1,15 +1,8 @@
-"""Poses by the factors that frames and poses share, and what begins their search.
-
-The search of `facert.models.factors` begins at what two Gaussian processes on the labels say, on
-the source as it is and on half-whitened features: clean captures want the one, real markers the
-other, and their mean serves all. No closed form tells what factors would say of a label left out:
-they are learned five times more, each time without a fifth of the labels, and the processes with
-them.
-"""
+"""Poses by the factors that frames and poses share, see `facert.models.factors.model`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -20,10 +13,8 @@ from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.folds import ranked_folds
-from facert.methods.regression import Map
-from facert.methods.ssgpr import Basis, FeatureProcess
-from facert.models.factors.censoring import Limits
+from facert.methods.regression import Map, Variance
+from facert.models.factors.censoring import ClippedMean, Limits
 from facert.models.factors.model import Evidence, learn_factors
 
 HUGE = 1e150  # its square is finite
@@ -31,7 +22,7 @@ HUGE = 1e150  # its square is finite
 
 @dataclass(frozen=True, eq=False)
 class FactorMap(Map):
-    """What the factors say about a frame's pose: a linear map, and what limits leave of it.
+    """The pose that the factors predict: a linear map, and what limits leave of it.
 
     Parameters
     ----------
@@ -65,37 +56,19 @@ class FactorMap(Map):
         if not ((self.spread > 0.0) & (self.spread < HUGE)).all():
             raise InputError("factors.spread", "positive numbers", "others", DAMAGED)
 
-    def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Poses of frames X (T, d_x), (T, d_y), and the standard deviation of the free ones."""
-        free = self.offset + (X - self.centre) @ self.weights
-        pose = self._limits.expected(free, self.spread)
-        return pose, np.repeat(self.spread[None], len(X), axis=0)
-
-    @cached_property
-    def _limits(self) -> Limits:
-        low, high = self.limits
-        at_low, at_high = self.censored > 0
-        return Limits(np.where(at_low, low, -np.inf), np.where(at_high, high, np.inf))
-
-
-@dataclass(frozen=True, eq=False)
-class Trio:
-    """Three maps learned from the same data: two processes, and the factors begun at them."""
-
-    plain: FeatureProcess
-    whitened: FeatureProcess
-    factors: FactorMap
-
     @classmethod
-    def learn(cls, labelled: Labelled, unlabelled: Unlabelled) -> Trio:
-        """From labelled frames, frames and poses."""
+    def learn(cls, labelled: Labelled, unlabelled: Unlabelled, guess: FloatArray) -> FactorMap:
+        """The factors of labelled frames, frames and poses.
+
+        Parameters
+        ----------
+        labelled, unlabelled : Labelled, Unlabelled
+        guess : array, shape (m, d_y)
+            Poses of the frames without one, at which the search begins.
+        """
         frames = np.vstack([labelled.X, unlabelled.X])
         poses = np.vstack([labelled.Y, unlabelled.Y])
-        mean = poses.mean(axis=0)
-        plain = FeatureProcess.learn(labelled, Basis.plain(frames), mean)
-        whitened = FeatureProcess.learn(labelled, Basis.half_whitened(frames), mean)
-        guess = (plain(unlabelled.X)[0] + whitened(unlabelled.X)[0]) / 2.0
-        centre, limits = frames.mean(axis=0), Limits.of(poses)
+        centre, mean, limits = frames.mean(axis=0), poses.mean(axis=0), Limits.of(poses)
         evidence = Evidence(
             labelled.X - centre,
             labelled.Y - mean,
@@ -107,7 +80,7 @@ class Trio:
         weights, spread = factors.regression()
         bounds = np.stack([limits.low, limits.high])
         censored = np.isfinite(bounds)
-        linear = FactorMap(
+        return cls(
             centre=centre,
             weights=weights,
             offset=mean + factors.mean,
@@ -115,23 +88,19 @@ class Trio:
             limits=np.where(censored, bounds, 0.0),
             censored=censored.astype(np.float64),
         )
-        return cls(plain, whitened, linear)
 
-    @property
-    def maps(self) -> Sequence[Map]:
-        """All three."""
-        return self.plain, self.whitened, self.factors
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
+        """Poses of frames X (T, d_x), (T, d_y), and the variance of the free ones."""
+        free = X @ self.weights
+        free += self._offset
+        return self._clipped(free), lambda: np.repeat(self.spread[None] ** 2, len(X), axis=0)
 
+    @cached_property
+    def _offset(self) -> FloatArray:
+        """The free pose of the frame 0, (d_y,)."""
+        return np.asarray(self.offset - self.centre @ self.weights)
 
-def left_out_poses(labelled: Labelled, unlabelled: Unlabelled) -> FloatArray:
-    """What each map of a trio says of labels that it was not given, (3, l, d_y).
-
-    The frames stay, without their poses.
-    """
-    said = np.empty((3, *labelled.Y.shape))
-    for train, test in ranked_folds(labelled.X):
-        rest = Labelled(labelled.X[train], labelled.Y[train])
-        frames = np.vstack([unlabelled.X, labelled.X[test]])
-        trio = Trio.learn(rest, Unlabelled(frames, unlabelled.Y))
-        said[:, test] = [map_(labelled.X[test])[0] for map_ in trio.maps]
-    return said
+    @cached_property
+    def _clipped(self) -> ClippedMean:
+        low, high = np.where(self.censored > 0, self.limits, [[-np.inf], [np.inf]])
+        return ClippedMean(Limits(low, high), self.spread)

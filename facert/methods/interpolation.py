@@ -30,7 +30,7 @@ class InterpolatingMap(Map):
         How far from going through the poses exactly, in normalised units of length.
     """
 
-    tells_std: ClassVar[bool] = False
+    predicts_std: ClassVar[bool] = False
     axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "smoothing": "1"}
 
     X: FloatArray
@@ -71,7 +71,7 @@ class NearestMap(Map):
         Posed frames.
     """
 
-    tells_std: ClassVar[bool] = False
+    predicts_std: ClassVar[bool] = False
     axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny"}
 
     X: FloatArray

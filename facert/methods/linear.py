@@ -31,7 +31,7 @@ class LinearMap(Map):
         b.
     """
 
-    tells_std: ClassVar[bool] = False
+    predicts_std: ClassVar[bool] = False
     axes: ClassVar[Mapping[str, str]] = {"weights": "xy", "offset": "y"}
 
     weights: FloatArray

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Self
@@ -20,7 +20,6 @@ from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
-from facert.methods.frame_stream import FrameMap, FrameStream, RowByRow
 from facert.models.device import find_device
 from facert.models.gaussian import Gaussian
 from facert.models.optim.monitor import Monitor
@@ -29,22 +28,20 @@ from facert.settings import Settings
 
 log = logging.getLogger(__name__)
 
+Variance = Callable[[], FloatArray]
+"""Works out the variance of poses, (T, d_y), when asked: in a stream, it hardly ever is."""
+
 
 @dataclass(frozen=True, eq=False)
 class Map(ArrayGroup, ABC):
-    """A trained map from complete frames to poses."""
+    """A trained map from complete frames to poses, quick for a single frame and for many."""
 
-    tells_std: ClassVar[bool] = True
-    """Whether poses come with their standard deviation."""
+    predicts_std: ClassVar[bool] = True
+    """Whether poses come with their variance."""
 
     @abstractmethod
-    def __call__(self, X: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """Poses of frames X (T, d_x), (T, d_y), and their standard deviation if there is one."""
-
-    @cached_property
-    def for_frames(self) -> FrameMap:
-        """The same for single frames, in a quicker form where there is one."""
-        return RowByRow(self)
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance | None]:
+        """Poses of frames X (T, d_x), (T, d_y), and their variance if there is one."""
 
 
 class Regression(ABC):
@@ -134,7 +131,7 @@ class Regression(ABC):
 
     def _linear_response(self, frames: FloatArray) -> FloatArray:
         """B, least squares of the map's poses on frames (n, d_x); the ridge is the Gaussian's."""
-        if not self.map_.tells_std:
+        if not self.map_.predicts_std:
             return np.empty((frames.shape[1], 0))
         poses, _ = self.map_(frames)
         products = (frames - self.gaps_.mean).T @ (poses - poses.mean(axis=0)) / len(frames)
@@ -142,11 +139,18 @@ class Regression(ABC):
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
+        X, variance = self.fill(frames, input_variance)
+        Y, own = self.map_(X)
+        return Prediction(Y, None if own is None else np.sqrt(own() + variance), X)
+
+    def fill(
+        self, frames: FloatArray, input_variance: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Complete frames (T, d_x), and the variance of poses (T, d_y) that the filling leaves."""
         X, variance = self.gaps_.fill_for(frames, self.response_)
         if input_variance is not None:
             variance = variance + np.nan_to_num(input_variance) @ self.response_**2
-        Y, std = self.map_(X)
-        return Prediction(Y, None if std is None else np.sqrt(std**2 + variance), X)
+        return X, variance
 
     def on(self, device: str) -> Self:
         """The method itself: on the CPU it is soon done. See `Method.on`."""
@@ -160,12 +164,12 @@ class Regression(ABC):
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other; none remembers those before."""
-        return FrameStream(self.map_.for_frames, self.gaps_, self.response_)
+        return _FrameStream(self)
 
     def save(self) -> dict[str, FloatArray]:
         """The arrays of the map, mean and covariance of the source, and B if there is one."""
         arrays = {f"map.{name}": array for name, array in self.map_.arrays.items()}
-        if self.map_.tells_std:
+        if self.map_.predicts_std:
             arrays["source.response"] = self.response_
         return {
             "source.mean": self.gaps_.mean,
@@ -182,7 +186,7 @@ class Regression(ABC):
             When an array is absent or the shapes do not fit together.
         """
         of_map = {f"map.{name}": axes for name, axes in self.map_type.all_axes().items()}
-        if self.map_type.tells_std:
+        if self.map_type.predicts_std:
             of_map["source.response"] = "xy"
         check_axes(arrays, {"source.mean": "x", "source.covariance": "xx", **of_map})
         try:
@@ -194,7 +198,7 @@ class Regression(ABC):
         self.gaps_ = Gaussian(arrays["source.mean"], arrays["source.covariance"])
         self.map_ = self.map_type.of(arrays, "map.")
         none = np.empty((len(self.gaps_.mean), 0))
-        self.response_ = arrays["source.response"] if self.map_type.tells_std else none
+        self.response_ = arrays["source.response"] if self.map_type.predicts_std else none
 
 
 class SupervisedRegression(Regression):
@@ -210,3 +214,31 @@ class SupervisedRegression(Regression):
     @abstractmethod
     def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[Map, dict[str, float]]:
         """The map from frames X (l, d_x) with poses Y (l, d_y), and what to report of it."""
+
+
+class _FrameStream:
+    """Maps frames one after the other; none is remembered."""
+
+    def __init__(self, method: Regression) -> None:
+        self._map, self._gaps, self._fill = method.map_, method.gaps_, method.fill
+
+    def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
+        """Map one more frame (1, d_x); see `facert.methods.base.Method.predict`."""
+        frame = frame.copy()  # for who asks for the variance, when it may hold another one
+        X = self._gaps.fill(frame)
+        Y, own = self._map(X)
+        if own is None:
+            return Prediction(Y, None, X)
+        return _FramePrediction(Y, X, lambda: own() + self._fill(frame, input_variance)[1])
+
+
+class _FramePrediction(Prediction):
+    """A prediction whose standard deviation is worked out on demand."""
+
+    def __init__(self, Y: FloatArray, X: FloatArray, variance: Variance) -> None:
+        vars(self).update(Y=Y, X=X, _variance=variance)  # it is frozen
+
+    @cached_property
+    def std(self) -> FloatArray:
+        """Standard deviation of the pose, (1, d_y)."""
+        return np.asarray(np.sqrt(vars(self)["_variance"]()))

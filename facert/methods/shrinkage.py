@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -55,4 +56,9 @@ class Shrinkage(ArrayGroup):
 
     def __call__(self, poses: FloatArray) -> FloatArray:
         """Likely poses in place of predicted ones, (T, d_y)."""
-        return self.mean + (poses - self.mean) @ self.matrix
+        return poses @ self.matrix + self.offset
+
+    @cached_property
+    def offset(self) -> FloatArray:
+        """The likely pose in place of the pose 0, (d_y,)."""
+        return np.asarray(self.mean - self.mean @ self.matrix)

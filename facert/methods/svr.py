@@ -39,7 +39,7 @@ class PackedMap(Map):
         Added to the sum.
     """
 
-    tells_std: ClassVar[bool] = False
+    predicts_std: ClassVar[bool] = False
     axes: ClassVar[Mapping[str, str]] = {
         "X": "nx",
         "inverse_widths": "g",

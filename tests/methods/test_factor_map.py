@@ -3,7 +3,8 @@
 import numpy as np
 
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.factors import FactorMap, Trio, left_out_poses
+from facert.methods.blend import BaseMaps, cross_validated_poses
+from facert.methods.factors import FactorMap
 from facert.methods.folds import ranked_folds
 
 
@@ -50,7 +51,7 @@ def test_limits_bend_the_map_smoothly_and_are_not_passed():
 
 def test_controls_that_are_often_closed_get_a_limit_there():
     labelled, unlabelled = data()
-    factors = Trio.learn(labelled, unlabelled).factors
+    factors = BaseMaps.learn(labelled, unlabelled).factors
     np.testing.assert_array_equal(factors.censored, [np.ones(5), np.zeros(5)])
     np.testing.assert_allclose(factors.limits[0], 1.0)
     assert (factors(unlabelled.X)[0] > 1.0).all()
@@ -82,12 +83,12 @@ def test_three_labels_are_left_out_one_by_one():
 
 def test_what_is_said_of_labels_left_out_does_not_depend_on_their_poses():
     labelled, unlabelled = data()
-    said = left_out_poses(labelled, unlabelled)
+    said = cross_validated_poses(labelled, unlabelled)
     assert said.shape == (3, 11, 5)
     _, test = ranked_folds(labelled.X)[2]
     poses = labelled.Y.copy()
     poses[test] = 99.0
-    again = left_out_poses(Labelled(labelled.X, poses), unlabelled)
+    again = cross_validated_poses(Labelled(labelled.X, poses), unlabelled)
     np.testing.assert_array_equal(again[:, test], said[:, test])
     others = np.delete(np.arange(11), test)
     assert (np.abs(again[:, others] - said[:, others]).max(axis=(1, 2)) > 0.1).all()
@@ -95,10 +96,9 @@ def test_what_is_said_of_labels_left_out_does_not_depend_on_their_poses():
 
 def test_what_is_said_of_labels_left_out_is_what_a_map_without_them_says():
     labelled, unlabelled = data()
-    said = left_out_poses(labelled, unlabelled)
+    said = cross_validated_poses(labelled, unlabelled)
     train, test = ranked_folds(labelled.X)[0]
     frames = np.vstack([unlabelled.X, labelled.X[test]])
     rest = Labelled(labelled.X[train], labelled.Y[train])
-    trio = Trio.learn(rest, Unlabelled(frames, unlabelled.Y))
-    for map_, poses in zip((trio.plain, trio.whitened, trio.factors), said, strict=True):
-        np.testing.assert_array_equal(map_(labelled.X[test])[0], poses[test])
+    maps = BaseMaps.learn(rest, Unlabelled(frames, unlabelled.Y))
+    np.testing.assert_array_equal(maps(labelled.X[test]), said[:, test])

@@ -10,13 +10,13 @@ from facert.methods.base import Labelled, Unlabelled
 from facert.methods.registry import REGISTRY, make_method, method_class
 from facert.settings import Settings
 
-# Every regression that tells a standard deviation.
-TELLING = [
+# Every regression that predicts a standard deviation.
+WITH_STD = [
     name
     for name in REGISTRY
-    if not method_class(name).stepwise and method_class(name).map_type.tells_std
+    if not method_class(name).stepwise and method_class(name).map_type.predicts_std
 ]
-telling = pytest.mark.parametrize("name", TELLING)
+with_std = pytest.mark.parametrize("name", WITH_STD)
 
 
 def data(seed=0):
@@ -50,24 +50,24 @@ def hide(X, count, seed=0):
 
 
 def test_the_blend_and_all_gaussian_processes_are_tried_here():
-    assert set(TELLING) == {"auto", "ssgpr", "gpr", "gpr-linear"}
+    assert set(WITH_STD) == {"auto", "ssgpr", "gpr", "gpr-linear"}
 
 
-@telling
+@with_std
 def test_of_complete_frames_it_is_the_maps_own(name, trained):
     X = data()[2].X
     method = trained(name)
-    np.testing.assert_array_equal(method.predict(X).std, method.map_(X)[1])
+    np.testing.assert_array_equal(method.predict(X).std, np.sqrt(method.map_(X)[1]()))
 
 
-@telling
+@with_std
 def test_poses_are_those_of_the_filled_frames(name, trained):
     method, X = trained(name), hide(data()[2].X, 5)
     filled = method.map_(method.gaps_.fill(X))[0]
     np.testing.assert_allclose(method.predict(X).Y, filled, rtol=1e-8, atol=1e-8)
 
 
-@telling
+@with_std
 def test_it_grows_with_what_is_hidden(name, trained):
     X = data()[2].X
     stds = [trained(name).predict(hide(X, count)).std for count in range(0, 13, 3)]
@@ -76,7 +76,7 @@ def test_it_grows_with_what_is_hidden(name, trained):
     assert np.mean(stds[3] > stds[1]) > 0.9
 
 
-@telling
+@with_std
 def test_a_frame_that_shows_nothing_leaves_about_the_spread_of_all_poses(name, trained):
     labelled, unlabelled, _ = data()
     std = trained(name).predict(np.full((1, 12), np.nan)).std[0]
@@ -84,7 +84,7 @@ def test_a_frame_that_shows_nothing_leaves_about_the_spread_of_all_poses(name, t
     np.testing.assert_allclose(std, spread, rtol=0.35)
 
 
-@telling
+@with_std
 @pytest.mark.parametrize("count", [0, 3, 6, 9, 12])
 def test_it_is_within_a_factor_of_two_of_the_errors(name, trained, count):
     test = data()[2]
@@ -92,7 +92,7 @@ def test_it_is_within_a_factor_of_two_of_the_errors(name, trained, count):
     assert 0.5 < rms((predicted.Y - test.Y) / predicted.std) < 2.0
 
 
-@telling
+@with_std
 def test_it_is_kept_with_the_model(name, trained):
     X = hide(data()[2].X, 5)
     loaded = make_method(Settings(method=name))

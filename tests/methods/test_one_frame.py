@@ -1,4 +1,4 @@
-"""Maps for single frames say what maps for batches say."""
+"""A frame alone gets what it gets in a batch, and processes together what each gets alone."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 import facert
 from facert.data.normalisation import Normalisation
 from facert.methods.base import Labelled, Unlabelled
-from facert.methods.one_frame import BlendFrame, FactorFrame, ProcessBank
+from facert.methods.processes import ProcessBank
 from facert.methods.registry import make_method
 from facert.settings import Settings
 
-EXACT = 1e-10
+EXACT = 1e-12
 
 
 @pytest.fixture(scope="module")
@@ -38,25 +38,25 @@ def blend(problem):
     return fitted("auto", problem).map_
 
 
-def assert_says(one, map_, frames, atol=EXACT):
-    """That `one` says of each frame what `map_` says of all."""
-    Y, std = map_(frames)
-    for x, pose, spread in zip(frames, Y, std, strict=True):
-        said, tell = one(x)
-        np.testing.assert_allclose(said, pose, atol=atol)
-        np.testing.assert_allclose(np.sqrt(tell()), spread, atol=atol)
+def assert_rows_are_the_batch(map_, frames, atol=EXACT):
+    """That a map predicts for each frame alone what it predicts for all at once."""
+    Y, variance = map_(frames)
+    for x, pose, spread in zip(frames, Y, variance(), strict=True):
+        alone, own = map_(x[None])
+        np.testing.assert_allclose(alone[0], pose, atol=atol)
+        np.testing.assert_allclose(own()[0], spread, atol=atol)
 
 
 @pytest.mark.parametrize("name", ["auto", "ssgpr", "gpr", "gpr-linear"])
 def test_one_frame_after_the_other_is_the_batch(name, problem):
     map_ = fitted(name, problem).map_
-    assert_says(map_.for_frames, map_, problem[2])
+    assert_rows_are_the_batch(map_, problem[2])
 
 
 @pytest.mark.parametrize("weights", [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0.3, 0.7]])
 def test_experts_without_weight_may_be_left_out(blend, problem, weights):
     some = replace(blend, weights=np.array(weights, dtype=float))
-    assert_says(BlendFrame(some), some, problem[2][:30])
+    assert_rows_are_the_batch(some, problem[2][:30])
 
 
 def test_processes_share_features_only_where_they_are_the_same(blend, problem):
@@ -64,24 +64,25 @@ def test_processes_share_features_only_where_they_are_the_same(blend, problem):
     moved = replace(blend.residual, centre=blend.residual.centre + 0.1)
     bank = ProcessBank([blend.plain, blend.whitened, blend.residual, moved])
     assert len(bank._features) == 3
-    expected = [p(frames) for p in (blend.plain, blend.whitened, blend.residual, moved)]
-    for row, x in enumerate(frames):
-        told = bank(x)
-        np.testing.assert_allclose(told.poses, [Y[row] for Y, _ in expected], atol=EXACT)
-        std = np.sqrt(bank.variances(told))
-        np.testing.assert_allclose(std, [s[row, 0] for _, s in expected], atol=EXACT)
+    expected = [alone(p, frames) for p in (blend.plain, blend.whitened, blend.residual, moved)]
+    poses, variances = bank(frames)
+    np.testing.assert_allclose(poses, [Y for Y, _ in expected], atol=EXACT)
+    np.testing.assert_allclose(variances(), [variance for _, variance in expected], atol=EXACT)
 
 
-def test_limits_take_from_factors_what_they_do_in_a_batch(blend, problem):
-    factors = blend.factors
-    assert 0 < factors.censored.sum() < factors.censored.size
-    one, expected = FactorFrame(factors), factors(problem[2])[0]
-    np.testing.assert_allclose([one(x) for x in problem[2]], expected, atol=1e-12)
+def alone(process, frames):
+    """Mean and variance of a process by the formulas of Rasmussen and Williams (2006), (2.25)."""
+    given, kernel = process.process, process.process.kernel
+    features = (frames - process.centre) @ process.basis
+    k = kernel.cross(features, given.X)
+    solved = np.linalg.solve(kernel.gram(given.X), k.T)
+    variance = kernel.noise + kernel.prior_variance(features) - np.sum(k.T * solved, axis=0)
+    return process.mean + solved.T @ given.Y, variance
 
 
 def test_far_off_frames_are_no_special_case(blend, problem):
     far = 100.0 * problem[2][:5]
-    assert_says(BlendFrame(blend), blend, far, atol=1e-7)
+    assert_rows_are_the_batch(blend, far, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["auto", "ssgpr", "ridge", "svr"])
@@ -118,4 +119,4 @@ def test_on_a_recording(real_data, target):
     rows = np.random.default_rng(0).permutation(len(X))
     problem = Labelled(X[rows[:20]], Y[rows[:20]]), Unlabelled(X[rows[20:120]], Y[rows[120:180]])
     map_ = fitted("auto", problem).map_
-    assert_says(map_.for_frames, map_, X[rows[-200:]])
+    assert_rows_are_the_batch(map_, X[rows[-200:]])

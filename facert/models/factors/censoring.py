@@ -24,6 +24,7 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 LEAST_SHARE = 0.2
 LEAST_COUNT = 2
 TOLERANCE = 1e-9  # relative to the range: "exactly"
+NO_LIMIT = 1e100  # standard deviations: what a limit so far away takes from a pose is 0 exactly
 LOG_2PI = float(np.log(2.0 * np.pi))
 
 
@@ -50,12 +51,34 @@ class Limits:
         at_high = moves & (np.sum(poses >= high - slack, axis=0) >= least)
         return cls(np.where(at_low, low, -np.inf), np.where(at_high, high, np.inf))
 
-    def expected(self, mean: FloatArray, std: FloatArray) -> FloatArray:
-        """E[y] of free poses y* with mean (T, d_y) and standard deviation (d_y,).
 
-        With r(t) = E[max(t + s ε, 0)] = t Φ(t/s) + s φ(t/s), it is m + r(low - m) - r(m - high).
-        """
-        return mean + _rectified(self.low - mean, std) - _rectified(mean - self.high, std)
+class ClippedMean:
+    """The mean E[y] of what limits leave of free poses y* ~ N(m, s²).
+
+    With r(t) = E[max(t + s ε, 0)] = t Φ(t/s) + s φ(t/s), it is m + r(low - m) - r(m - high).
+
+    Parameters
+    ----------
+    limits : Limits
+    std : array, shape (d_y,)
+        s.
+    """
+
+    def __init__(self, limits: Limits, std: FloatArray) -> None:
+        # low - m and m - high are the same with other signs.
+        self._signed_std = np.array([[[1.0]], [[-1.0]]]) * std
+        ends = np.stack([limits.low, limits.high])[:, None]
+        self._ends = np.clip(ends, -NO_LIMIT * std, NO_LIMIT * std)
+
+    def __call__(self, mean: FloatArray) -> FloatArray:
+        """E[y] of free poses with mean (T, d_y)."""
+        t = (self._ends - mean) / self._signed_std  # (2, T, d_y)
+        taken = np.exp(-0.5 * (t * t + LOG_2PI))
+        taken += t * ndtr(t)
+        taken *= self._signed_std
+        expected = mean + taken[0]
+        expected += taken[1]
+        return expected
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +130,3 @@ def _below(mean: FloatArray, std: FloatArray, limit: FloatArray) -> tuple[FloatA
     a = (limit - mean) / std
     ratio = np.exp(-0.5 * (a * a + LOG_2PI) - log_ndtr(a))  # φ(a)/Φ(a)
     return mean - std * ratio, std**2 * np.maximum(1.0 - a * ratio - ratio**2, 0.0)
-
-
-def _rectified(mean: FloatArray, std: FloatArray) -> FloatArray:
-    t = mean / std
-    with np.errstate(invalid="ignore"):  # -inf times 0: no limit
-        value = mean * ndtr(t) + std * np.exp(-0.5 * (t * t + LOG_2PI))
-    return np.where(np.isneginf(mean), 0.0, value)

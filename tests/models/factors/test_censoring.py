@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm, truncnorm
 
-from facert.models.factors.censoring import CensoredPoses, Limits
+from facert.models.factors.censoring import CensoredPoses, ClippedMean, Limits
 
 
 def limits(low, high):
@@ -56,7 +56,7 @@ def test_the_expected_pose_is_the_mean_of_the_clipped_one(low, high, mean, std):
         mean + 12.0 * std,
         points=[limit for limit in (low, high) if abs(limit - mean) < 12.0 * std] or None,
     )
-    found = limits(low, high).expected(np.array([[mean]]), np.array([std]))
+    found = ClippedMean(limits(low, high), np.array([std]))(np.array([[mean]]))
     np.testing.assert_allclose(found[0, 0], expected, atol=1e-7)
 
 

@@ -1,0 +1,229 @@
+"""Gaussian processes on features of frames, which several methods are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from facert.data.array_group import DAMAGED, ArrayGroup
+from facert.data.arrays import FloatArray
+from facert.errors import InputError
+from facert.methods.base import Labelled
+from facert.methods.regression import Map, Variance
+from facert.models.gp.hyperparameters import maximise_likelihood
+from facert.models.gp.jitter import whitener
+from facert.models.kernels import RegressionKernel, squared_exponential
+from facert.models.whitening import whitening
+
+POWER = 0.5  # half-whitening
+# The search for the kernel takes time with the cube of the labels, and a few determine it as well.
+MOST_SEARCHED = 200
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessMap(Map):
+    """A Gaussian process given its training data.
+
+    Parameters
+    ----------
+    X, Y : arrays, shapes (n, d_x) and (n, d_y)
+        Training frames and poses, with mean zero.
+    theta : array, shape (4,)
+        θ1, θ2, θ3 and θ4 of `facert.models.gp.hyperparameters`; θ1 or θ4 may be 0.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "theta": "4"}
+
+    X: FloatArray
+    Y: FloatArray
+    theta: FloatArray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.theta < 0).any() or not self.theta[1:3].all():
+            raise InputError("theta", "positive numbers", f"{self.theta}", DAMAGED)
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
+        """Mean of a new observation at each frame, and its variance, noise included."""
+        return self._on_the_source(X)
+
+    @cached_property
+    def kernel(self) -> RegressionKernel:
+        """The kernel that all columns share."""
+        theta1, theta2, theta3, theta4 = self.theta.tolist()
+        return RegressionKernel(theta1, theta2, 1.0 / theta3, theta4)
+
+    @cached_property
+    def whitening(self) -> FloatArray:
+        """L⁻ᵀ, where L Lᵀ = K, (n, n)."""
+        return np.ascontiguousarray(whitener(self.kernel.gram(self.X)).T)
+
+    @cached_property
+    def alpha(self) -> FloatArray:
+        """K⁻¹ Y, (n, d_y)."""
+        return np.asarray(self.whitening @ (self.whitening.T @ self.Y))
+
+    @property
+    def left_out_errors(self) -> FloatArray:
+        """Each pose less what would be said of it if it alone were left out, (n, d_y).
+
+        (K⁻¹Y)_i / (K⁻¹)_ii: Rasmussen and Williams (2006), Eq. (5.12).
+        """
+        diagonal = np.einsum("nm,nm->n", self.whitening, self.whitening)
+        errors: FloatArray = self.alpha / diagonal[:, None]
+        return errors
+
+    @cached_property
+    def _on_the_source(self) -> FeatureProcess:
+        d_x, d_y = self.X.shape[1], self.Y.shape[1]
+        return FeatureProcess(np.zeros(d_x), np.eye(d_x), np.zeros(d_y), self)
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureProcess(Map):
+    """A Gaussian process with a linear term, on features of the source.
+
+    Parameters
+    ----------
+    centre : array, shape (d_x,)
+        Mean of all frames.
+    basis : array, shape (d_x, d_x)
+        Of the features, see `facert.models.whitening.whitening`.
+    mean : array, shape (d_y,)
+        The pose expected before any label is seen.
+    process : ProcessMap
+        From features to poses less their mean.
+    """
+
+    axes: ClassVar[Mapping[str, str]] = {"centre": "x", "basis": "xx", "mean": "y"}
+    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {"process": ProcessMap}
+
+    centre: FloatArray
+    basis: FloatArray
+    mean: FloatArray
+    process: ProcessMap
+
+    @classmethod
+    def learn(cls, labelled: Labelled, basis: Basis, mean: FloatArray) -> FeatureProcess:
+        """The process of maximum likelihood given labelled frames."""
+        features, targets = basis.features(labelled.X), labelled.Y - mean
+        step = -(-len(features) // MOST_SEARCHED)
+        kernel = maximise_likelihood(features[::step], targets[::step]).kernel
+        theta = np.array([*kernel.theta, kernel.linear])
+        return cls(basis.centre, basis.matrix, mean, ProcessMap(features, targets, theta))
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
+        """Poses of frames X (T, d_x), (T, d_y), and their variance, the same for all controls."""
+        poses, variances = self._bank(X)
+        return poses[0], lambda: np.repeat(variances()[0, :, None], len(self.mean), axis=1)
+
+    @cached_property
+    def _bank(self) -> ProcessBank:
+        return ProcessBank([self])
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Features of frames: φ(x) = (x - centre) matrix."""
+
+    centre: FloatArray
+    matrix: FloatArray
+
+    @classmethod
+    def plain(cls, frames: FloatArray) -> Basis:
+        """The source as it is, noise and all, less the mean of frames (n, d_x)."""
+        return cls(frames.mean(axis=0), np.eye(frames.shape[1]))
+
+    @classmethod
+    def half_whitened(cls, frames: FloatArray) -> Basis:
+        """Features whose proportions are half-way to equal, learned from frames (n, d_x)."""
+        return cls(frames.mean(axis=0), whitening(frames, POWER))
+
+    def features(self, X: FloatArray) -> FloatArray:
+        """Features of frames X (T, d_x), (T, d_x)."""
+        return (X - self.centre) @ self.matrix
+
+
+class ProcessBank:
+    """Processes on the same n labels, evaluated together.
+
+    Processes on the same features share products and distances, and all poses are one product with
+    their α. So a single frame takes few operations, and a batch little memory.
+
+    Parameters
+    ----------
+    processes : sequence of FeatureProcess, length p
+    """
+
+    def __init__(self, processes: Sequence[FeatureProcess]) -> None:
+        self._features: list[_Features] = []
+        self._of = np.array([self._place(process) for process in processes])
+        self._norms = np.stack([features.norms for features in self._features])[:, None]
+        theta = np.array([process.process.theta for process in processes])
+        self._theta1, self._theta2, theta3, self._theta4 = theta.T[:, :, None, None]
+        self._noise = 1.0 / theta3[:, 0]
+        self._alpha = np.stack([process.process.alpha for process in processes])
+        self._means = np.stack([process.mean for process in processes])[:, None]
+        self._whitening = np.stack([process.process.whitening for process in processes])
+
+    def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
+        """Poses of frames X (T, d_x), (p, T, d_y), and their variances, noise included, (p, T)."""
+        products = np.empty((len(self._features), len(X), self._norms.shape[2]))
+        squares = np.empty((len(self._features), len(X), 1))
+        for row, features in enumerate(self._features):
+            phi = features(X)
+            np.matmul(phi, features.transposed, out=products[row])
+            squares[row, :, 0] = np.vecdot(phi, phi)
+        distances = self._norms + squares
+        distances -= 2.0 * products
+        np.maximum(distances, 0.0, out=distances)
+        k = squared_exponential(distances[self._of], self._theta1, self._theta2)
+        k += self._theta4 * products[self._of]
+        poses = np.matmul(k, self._alpha)
+        poses += self._means
+        return poses, lambda: self._variances(k, squares)
+
+    def _variances(self, k: FloatArray, squares: FloatArray) -> FloatArray:
+        """Variances (p, T), from the kernels (p, T, n) and |φ|² of every feature (f, T, 1)."""
+        whitened = np.matmul(k, self._whitening)
+        explained = np.vecdot(whitened, whitened)
+        prior = self._theta1 + self._theta4 * squares[self._of]
+        # Rounding can take the difference below the noise, which is its least value.
+        return np.asarray(self._noise + np.maximum(prior[:, :, 0] - explained, 0.0))
+
+    def _place(self, process: FeatureProcess) -> int:
+        """The index of its features in the list, where they are put if they are new."""
+        for place, features in enumerate(self._features):
+            if features.are_those_of(process):
+                return place
+        self._features.append(_Features(process))
+        return len(self._features) - 1
+
+
+class _Features:
+    """Features of frames, but for those that are always 0, and of the labels."""
+
+    def __init__(self, process: FeatureProcess) -> None:
+        self._process = process
+        kept = process.basis.any(axis=0)
+        self.transposed = np.ascontiguousarray(process.process.X[:, kept]).T
+        self.norms = np.sum(process.process.X**2, axis=1)
+        is_plain = np.array_equal(process.basis, np.eye(len(process.basis)))
+        self._centre = process.centre
+        self._basis = None if is_plain else np.ascontiguousarray(process.basis[:, kept])
+
+    def are_those_of(self, other: FeatureProcess) -> bool:
+        own = self._process
+        return (
+            np.array_equal(own.centre, other.centre)
+            and np.array_equal(own.basis, other.basis)
+            and np.array_equal(own.process.X, other.process.X)
+        )
+
+    def __call__(self, X: FloatArray) -> FloatArray:
+        centred = X - self._centre
+        return centred if self._basis is None else centred @ self._basis
