@@ -128,12 +128,8 @@ class BlendMap(Map):
         return ProcessBank([*processes, self.residual])
 
     @cached_property
-    def _low(self) -> FloatArray:
-        return self.range[0]
-
-    @cached_property
-    def _high(self) -> FloatArray:
-        return self.range[1]
+    def _ends(self) -> tuple[FloatArray, ...]:
+        return tuple(self.range)
 
     @cached_property
     def _matrices(self) -> FloatArray:
@@ -144,8 +140,9 @@ class BlendMap(Map):
         return np.stack([s.offset for s in (self.shrinkage, self.residual_shrinkage)])[:, None]
 
     def _clip(self, poses: FloatArray) -> None:
-        np.maximum(poses, self._low, out=poses)
-        np.minimum(poses, self._high, out=poses)
+        low, high = self._ends
+        np.maximum(poses, low, out=poses)
+        np.minimum(poses, high, out=poses)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,7 +76,7 @@ class ClippedMean:
         taken = np.exp(-0.5 * (t * t + LOG_2PI))
         taken += t * ndtr(t)
         taken *= self._signed_std
-        expected = mean + taken[0]
+        expected: FloatArray = mean + taken[0]
         expected += taken[1]
         return expected
 
