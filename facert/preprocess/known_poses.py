@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import Take
+from facert.settings import LimitRule
 
 # Beyond, more poses tell little, and a new set of given controls takes longer to learn.
 MOST = 500
@@ -56,6 +58,20 @@ def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> Float
     if animation is None:
         return labels
     return np.vstack([labels, _some(animation, MOST - len(labels), rng)])
+
+
+def pose_bounds(take: Take, posed: FloatArray, rule: LimitRule) -> FloatArray | None:
+    """What poses are clipped to, (P, 2): the take's declared limits, or the range of known poses.
+
+    These are given poses (l, P), as of the labelled frames, and all of the animation.
+    """
+    declared = None if take.controls is None else take.controls.limits
+    if rule == "none":
+        return None
+    if rule == "declared" or declared is not None:
+        return declared
+    poses = posed if take.animation is None else np.vstack([posed, take.animation])
+    return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
 
 
 def _some(poses: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:

@@ -1,4 +1,4 @@
-"""From a take as it was recorded to one that can be learned from."""
+"""From a take as it was recorded to all that is learned from it: the door of `train`."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.data.take import Source, Take
+from facert.data.ranges import parse_frames
+from facert.data.take import Controls, Source, Take
 from facert.data.text import plural
+from facert.errors import InputError
 from facert.preprocess.faults import without_faults
+from facert.preprocess.known_poses import keep, pose_bounds
 from facert.preprocess.motion.estimate import (
     LEAST_NOISE,
     Estimate,
     estimate_if_it_moves,
     largest_step,
 )
-from facert.preprocess.motion.motion import Motion
 from facert.preprocess.motion.noise import capture_noise
-from facert.preprocess.training_set import MIN_OBSERVED
+from facert.preprocess.neutral import at_rest, most_neutral
+from facert.preprocess.training_set import MIN_OBSERVED, TrainingSet, choose_training_set
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -44,31 +48,87 @@ class Prepared:
         The same with noise and gaps.
     units : Normalisation
         Of the measured source.
-    smoothed : Estimate or None
-        What was told of noise and motion, where they were told apart.
+    estimate : Estimate or None
+        Of noise and motion; None where frames do not follow each other.
     """
 
     take: Take
     measured: Source
     units: Normalisation
-    smoothed: Estimate | None
-
-    @property
-    def motion(self) -> Motion | None:
-        """How the source moves, normalised units."""
-        return None if self.smoothed is None else self.smoothed.motion
+    estimate: Estimate | None
 
     @property
     def step(self) -> float:
         """How far frames move on from one to the next, normalised units: σ_t, Eq. (14)."""
-        if self.smoothed is not None:
-            return max(self.smoothed.sigma_t / self.units.scale, LEAST_NOISE)
+        if self.estimate is not None:
+            return max(self.estimate.sigma_t / self.units.scale, LEAST_NOISE)
         X = self.measured.matrix
         return max(largest_step(X, capture_noise(X)) / self.units.scale, LEAST_NOISE)
 
 
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """All that is learned from a take, in the take's units, and the units to normalise it by.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    names : tuple of str
+        Of the markers or weights that the take was recorded with, seen or not.
+    controls : Controls
+    chosen : TrainingSet
+        Frames and poses that a method is given.
+    complete : array, shape (n, d_x)
+        Frames that show everything, to estimate the noise from.
+    neutral : array, shape (d_x,)
+        The source with the actor at rest; see `Settings.neutral`.
+    bounds : array, shape (P, 2), or None
+        What poses are clipped to.
+    target_units : Normalisation
+        Of the chosen poses.
+    kept : array, shape (k, P)
+        Known poses that a model keeps.
+    """
+
+    prepared: Prepared
+    names: tuple[str, ...]
+    controls: Controls
+    chosen: TrainingSet
+    complete: FloatArray
+    neutral: FloatArray
+    bounds: FloatArray | None
+    target_units: Normalisation
+    kept: FloatArray
+
+
+def training_data(take: Take, settings: Settings) -> TrainingData:
+    """Clean a take, and draw from it what a method is to learn.
+
+    Raises
+    ------
+    InputError
+        When the take has too few labels, or source or poses that never change.
+    """
+    if take.controls is None:
+        raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
+    prepared = prepare(take, settings)
+    clean = prepared.take
+    chosen = choose_training_set(clean, settings)
+    return TrainingData(
+        prepared,
+        take.source.names,
+        take.controls,
+        chosen,
+        _complete_frames(clean.source, chosen),
+        _neutral(clean, chosen, settings),
+        pose_bounds(clean, chosen.Y_labelled, settings.limits),
+        Normalisation.of(chosen.poses, "/target/params"),
+        keep(chosen.Y_labelled, clean.animation, settings.seed),
+    )
+
+
 def prepare(take: Take, settings: Settings) -> Prepared:
-    """Take out of a take what is not to be learned.
+    """Take bad markers, noise and gaps out of a take, and what no frame shows.
 
     Raises
     ------
@@ -81,15 +141,15 @@ def prepare(take: Take, settings: Settings) -> Prepared:
         _warn_of_zeros(take.source)
     source = _observed_part(take.source)
     units = Normalisation.of(source.matrix, f"/source/{source.kind}")
-    smoothed = estimate_if_it_moves(source.matrix, take.time) if settings.smooth else None
-    if smoothed is None:
+    found = estimate_if_it_moves(source.matrix, take.time) if settings.smooth else None
+    if found is None:
         return Prepared(replace(take, source=source), source, units, None)
-    log.info("%s", smoothed.told(take.units))
-    measured, clean = source.matrix, smoothed.frames
+    log.info("%s", found.summary(take.units))
+    measured, clean = source.matrix, found.frames
     left = np.where(np.isnan(measured), clean, clean + LEFT * (measured - clean))
     shown = source.valid.mean(axis=1) >= MIN_OBSERVED
     frames = np.where(shown[:, None], left, measured)
-    return Prepared(replace(take, source=source.with_matrix(frames)), source, units, smoothed)
+    return Prepared(replace(take, source=source.with_matrix(frames)), source, units, found)
 
 
 def _observed_part(source: Source) -> Source:
@@ -111,3 +171,21 @@ def _warn_of_zeros(source: Source) -> None:
     if zeros:
         positions = plural(zeros, "marker position")
         log.warning("%s exactly at (0, 0, 0): lost ones should be NaN", positions)
+
+
+def _complete_frames(source: Source, chosen: TrainingSet) -> FloatArray:
+    """Frames that show everything, (n, d); where they are few, the filled ones of the training."""
+    complete = source.matrix[~np.isnan(source.matrix).any(axis=1)]
+    filled = np.vstack([chosen.X_labelled, chosen.X_unlabelled])
+    return complete if len(complete) > len(filled) else filled
+
+
+def _neutral(take: Take, chosen: TrainingSet, settings: Settings) -> FloatArray:
+    """The source with the actor at rest, (d_x,): in frames that are named, or the smallest pose."""
+    if settings.neutral is None:
+        return np.asarray(chosen.X_labelled[most_neutral(chosen.Y_labelled)])
+    frames = np.array(parse_frames(settings.neutral, "neutral"), dtype=np.int64)
+    rest = at_rest(take.source.matrix, frames)
+    if np.isnan(rest).any():
+        raise InputError("neutral", "frames that show the face", "hidden markers", "Name others.")
+    return rest

@@ -127,7 +127,7 @@ class Retargeter(TrainedModel):
         if smoothed is None:
             said, std_x = self.method.predict(measured), None
         else:
-            log.info("%s", smoothed.told(take.units))
+            log.info("%s", smoothed.summary(take.units))
             clean, std_x = self.source_units.apply(smoothed.frames), smoothed.std
             input_variance = np.where(np.isnan(X), smoothed.std / self.source_units.scale, 0.0) ** 2
             said = self.method.predict(clean, input_variance)

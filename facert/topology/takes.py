@@ -13,6 +13,7 @@ from facert.data.names import NameIndex
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
+from facert.preprocess.known_poses import pose_bounds
 from facert.settings import LimitRule
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate
@@ -73,7 +74,7 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     performance = KeyedPerformance(source, chosen, take.params[chosen][:, None, :])
     how = how or Propagation()
     params = how.run(performance)[:, 0]
-    bounds = _bounds(take, take.params[chosen], how.limits)
+    bounds = pose_bounds(take, take.params[chosen], how.limits)
     if bounds is not None:
         params = np.clip(params, *bounds.T)
     return replace(take, params=params, std=None)
@@ -133,17 +134,6 @@ def propagate_positions(
         units=target.units,
         up_axis=target.up_axis,
     )
-
-
-def _bounds(take: Take, keyed: FloatArray, rule: LimitRule) -> FloatArray | None:
-    """What poses are clipped to, (P, 2); keyed are the poses (l, P) of the key frames."""
-    if rule == "none":
-        return None
-    declared = None if take.controls is None else take.controls.limits
-    if rule == "declared" or declared is not None:
-        return declared
-    known = keyed if take.animation is None else np.vstack([keyed, take.animation])
-    return np.stack([known.min(axis=0), known.max(axis=0)], axis=1)
 
 
 def filled_source(source: Source) -> FloatArray:

@@ -74,8 +74,8 @@ class Estimate:
             ratio = error_of_filling(self.given, noise, float(self.motion.clock[0]))
         return frozen(np.where(self.hidden, ratio * self.spread, self.spread))
 
-    def told(self, unit: str) -> str:
-        """What was estimated, for people."""
+    def summary(self, unit: str) -> str:
+        """Noise and motion, for people."""
         unit = f" {unit}" if unit else ""
         return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} a frame"
 
