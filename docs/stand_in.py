@@ -24,8 +24,7 @@ from facert.demo import acting, actor_rig, character_rig
 from facert.demo.build import ACTOR
 from facert.demo.character import CONTROLS, animate
 from facert.demo.expressions import ACTIVATIONS
-from facert.demo.head import make_head
-from facert.demo.markers import marker_vertices
+from facert.demo.head import make_head, marker_vertices
 from facert.io.glb import write_glb
 from facert.mesh.morphs import Morphs
 from facert.preprocess.faults import without_faults

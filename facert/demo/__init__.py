@@ -1,8 +1,7 @@
 """A procedural actor and a differently built character, with performances; nothing to download.
 
-`build` holds the proportions of both heads, `clay`, `skin`, `parts` and `head` model them,
-`expressions` move them, `acting` directs the actor, `character` is the other rig, and `takes`
-records it all.
+`build` holds the proportions of both heads, `parts`, `skin` and `head` model them, `expressions`
+move them, `acting` directs the actor, `character` is the other rig, and `files` records it all.
 """
 
 from facert.demo.files import (

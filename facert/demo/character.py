@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -75,7 +76,7 @@ CONTROLS = (
 
 def animate(activations: FloatArray) -> FloatArray:
     """The pose (T, 21) an animator would give for the actor's activations (T, 26)."""
-    effects = _effects(_Columns(activations))
+    effects = _effects(SimpleNamespace(**dict(zip(ACTIVATIONS, activations.T, strict=True))))
     return np.column_stack([control.setting(effects[control.name]) for control in CONTROLS])
 
 
@@ -87,18 +88,8 @@ def control_shapes(shapes: FloatArray) -> FloatArray:
     return np.asarray(np.tensordot(blend, shapes, axes=1))
 
 
-class _Columns:
-    """Activations by name."""
-
-    def __init__(self, activations: FloatArray) -> None:
-        self._columns: dict[str, FloatArray] = dict(zip(ACTIVATIONS, activations.T, strict=True))
-
-    def __getattr__(self, name: str) -> FloatArray:
-        return self._columns[name]
-
-
-def _effects(a: _Columns) -> dict[str, FloatArray]:
-    """What each control has to do; where two controls act together, each does its part."""
+def _effects(a: SimpleNamespace) -> dict[str, FloatArray]:
+    """The effect of each control that expresses activations, given by name; couplings undone."""
     brows_down = (a.brow_down_L + a.brow_down_R) / 2
     smile = (a.smile_L + a.smile_R) / 2
     frown = (a.frown_L + a.frown_R) / 2

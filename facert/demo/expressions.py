@@ -5,68 +5,44 @@ Every field is made from the landmarks of a `Build`, so the same few lines move 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from facert.data.arrays import FloatArray
+from facert.demo.build import Build
 from facert.demo.head import Head
 from facert.demo.parts import Tissue
 from facert.demo.skin import LID_EDGE, LIP_EDGE
 
-ACTIVATIONS = (
-    "brow_inner_up",
-    "brow_outer_up_L",
-    "brow_outer_up_R",
-    "brow_down_L",
-    "brow_down_R",
-    "blink_L",
-    "blink_R",
-    "squint",
-    "eye_wide",
-    "cheek_raise",
-    "nose_wrinkle",
-    "smile_L",
-    "smile_R",
-    "frown_L",
-    "frown_R",
-    "stretch",
-    "pucker",
-    "funnel",
-    "lips_press",
-    "upper_lip_up",
-    "lower_lip_down",
-    "mouth_left",
-    "mouth_right",
-    "jaw_open",
-    "jaw_left",
-    "jaw_right",
-)
+_ACTIVATIONS = """
+    brow_inner_up brow_outer_up_L brow_outer_up_R brow_down_L brow_down_R blink_L blink_R squint
+    eye_wide cheek_raise nose_wrinkle smile_L smile_R frown_L frown_R stretch pucker funnel
+    lips_press upper_lip_up lower_lip_down mouth_left mouth_right jaw_open jaw_left jaw_right
+"""
+ACTIVATIONS = tuple(_ACTIVATIONS.split())
+
+_Pull = tuple[tuple[float, float], tuple[float, float, float], float]
 
 
 def expressions(head: Head) -> FloatArray:
     """Displacements (26, V, 3) in cm of all `ACTIVATIONS`, each fully on."""
     muscles = Muscles(head)
-    left = {
-        "brow_outer_up": muscles.brow_outer_up(),
-        "brow_down": muscles.brow_down(),
-        "blink": muscles.close_lids(0.82, 0.18),
-        "smile": muscles.smile(),
-        "frown": muscles.frown(),
-    }
-    sideways = muscles.mouth_left(), muscles.jaw_left()
-    both = {
-        "brow_inner_up": muscles.brow_inner_up(),
-        "squint": muscles.close_lids(0.12, 0.34),
-        "eye_wide": muscles.close_lids(-0.30, -0.10),
-        "cheek_raise": muscles.cheek_raise(),
-        "nose_wrinkle": muscles.nose_wrinkle(),
-        "stretch": muscles.stretch(),
-    }
+    pulled = {name: muscles.pull(pulls) for name, pulls in _pulls(head.build).items()}
+    left = {name: pulled[name] for name in ("brow_outer_up", "brow_down", "smile", "frown")}
+    left["blink"] = muscles.close_lids(0.82, 0.18)
+    both = {name: pulled[name] for name in ("brow_inner_up", "cheek_raise", "nose_wrinkle")}
+    both["stretch"] = pulled["stretch"]
+    both["squint"] = muscles.close_lids(0.12, 0.34)
+    both["eye_wide"] = muscles.close_lids(-0.30, -0.10)
+    sideways = {"mouth": pulled["mouth_left"], "jaw": muscles.jaw_left()}
     shapes = {f"{name}_L": shape for name, shape in left.items()}
     shapes |= {f"{name}_R": muscles.mirrored(shape) for name, shape in left.items()}
     shapes |= {name: shape + muscles.mirrored(shape) for name, shape in both.items()}
-    shapes |= dict(zip(("mouth_left", "jaw_left"), sideways, strict=True))
-    shapes |= dict(zip(("mouth_right", "jaw_right"), map(muscles.mirrored, sideways), strict=True))
+    shapes |= {f"{name}_left": shape for name, shape in sideways.items()}
+    shapes |= {f"{name}_right": muscles.mirrored(shape) for name, shape in sideways.items()}
     shapes |= {
         "pucker": muscles.pucker(),
         "funnel": muscles.funnel(),
@@ -76,6 +52,45 @@ def expressions(head: Head) -> FloatArray:
         "jaw_open": muscles.jaw_open(),
     }
     return np.stack([shapes[name] for name in ACTIVATIONS])
+
+
+def _pulls(build: Build) -> dict[str, tuple[_Pull, ...]]:
+    """The muscles of the left half that only pull: point of the front view, way, radius."""
+    brow, width = build.brow, build.mouth.width
+    (ix, iy), (ax, ay), (ox, oy) = brow.inner, brow.arch, brow.outer
+    (cheek_x, cheek_y), (nose_x, nose_y) = build.cheek, build.nose
+    corner = _mouth_corner(build)
+    return {
+        "brow_inner_up": (((ix + 0.2, iy + 0.1), (-0.12, 0.85, 0.1), 1.15),),
+        "brow_outer_up": ((((ax + ox) / 2, (ay + oy) / 2), (0.05, 0.9, 0.05), 1.5),),
+        # Most at the inner end.
+        "brow_down": (
+            (brow.inner, (-0.28, -0.6, 0.2), 1.0),
+            (brow.arch, (-0.15, -0.42, 0.05), 1.3),
+        ),
+        "cheek_raise": (((cheek_x - 0.3, cheek_y + 0.5), (-0.05, 0.6, 0.32), 1.3),),
+        # The wing of the nose goes up, with lip and brow.
+        "nose_wrinkle": (
+            (brow.inner, (-0.12, -0.25, 0.1), 0.9),
+            ((nose_x + 0.1, nose_y), (0.12, 0.55, 0.05), 0.85),
+        ),
+        # The cheek follows the corner of the mouth.
+        "smile": (
+            (corner, (0.75, 0.85, -0.45), 1.25),
+            ((cheek_x - 0.4, cheek_y), (0.1, 0.35, 0.38), 1.2),
+        ),
+        "frown": ((corner, (0.12, -0.85, -0.1), 1.15),),
+        "stretch": ((corner, (0.85, -0.12, -0.5), 1.3),),
+        "mouth_left": (
+            ((0.15 * width, build.mouth.centre[1]), (0.9, 0.0, 0.0), 2.1),
+            (corner, (0.0, 0.15, -0.35), 1.2),
+        ),
+    }
+
+
+def _mouth_corner(build: Build) -> tuple[float, float]:
+    mouth = build.mouth
+    return mouth.width * 1.04, mouth.centre[1] + 0.65 * mouth.curve * mouth.width
 
 
 class Muscles:
@@ -97,32 +112,19 @@ class Muscles:
             self.soft[row] *= follow
             self.soft[head.mirror[row]] *= follow
         self.lower = self._lower_lip()
-        self.corner = np.array(
-            [
-                self.build.mouth.width * 1.04,
-                self.build.mouth.centre[1] + 0.65 * self.build.mouth.curve * self.build.mouth.width,
-            ]
-        )
+
+    def pull(self, pulls: Sequence[_Pull]) -> FloatArray:
+        """Everything near each point of the front view moves its way, less further away."""
+        parts = []
+        for centre, way, radius in pulls:
+            distance = np.linalg.norm(self.rest[:, :2] - centre, axis=1) / (radius * self._reach)
+            weight = self.soft * np.exp(-0.5 * distance**2)
+            parts.append(self.build.motion * weight[:, None] * np.asarray(way))
+        return reduce(np.add, parts)
 
     def mirrored(self, shape: FloatArray) -> FloatArray:
         """The same on the right side."""
         return np.asarray(shape[self.head.mirror] * [-1.0, 1.0, 1.0])
-
-    def brow_inner_up(self) -> FloatArray:
-        """Inner brow up, towards the middle."""
-        x, y = self.build.brow.inner
-        return self._pull((x + 0.2, y + 0.1), (-0.12, 0.85, 0.1), 1.15)
-
-    def brow_outer_up(self) -> FloatArray:
-        """Outer two thirds of the brow up."""
-        (ax, ay), (ox, oy) = self.build.brow.arch, self.build.brow.outer
-        return self._pull(((ax + ox) / 2, (ay + oy) / 2), (0.05, 0.9, 0.05), 1.5)
-
-    def brow_down(self) -> FloatArray:
-        """Brow down and inwards, most at the inner end."""
-        (ix, iy), (ax, ay) = self.build.brow.inner, self.build.brow.arch
-        inner = self._pull((ix, iy), (-0.28, -0.6, 0.2), 1.0)
-        return inner + self._pull((ax, ay), (-0.15, -0.42, 0.05), 1.3)
 
     def close_lids(self, upper: float, lower: float) -> FloatArray:
         """Move the lids over the eyeball, each by its part of the opening."""
@@ -141,31 +143,6 @@ class Muscles:
         for row, bulge in enumerate((0.10, 0.10, 0.30)):
             shape[lids[row], 2] += bulge * eye.ball[2] * travel
         return shape
-
-    def cheek_raise(self) -> FloatArray:
-        """Cheek up under the eye."""
-        x, y = self.build.cheek
-        return self._pull((x - 0.3, y + 0.5), (-0.05, 0.6, 0.32), 1.3)
-
-    def nose_wrinkle(self) -> FloatArray:
-        """Wing of the nose up, with lip and brow."""
-        x, y = self.build.nose
-        brow = self._pull(self.build.brow.inner, (-0.12, -0.25, 0.1), 0.9)
-        return brow + self._pull((x + 0.1, y), (0.12, 0.55, 0.05), 0.85)
-
-    def smile(self) -> FloatArray:
-        """Corner of the mouth out and up, the cheek follows."""
-        x, y = self.build.cheek
-        corner = self._pull(tuple(self.corner), (0.75, 0.85, -0.45), 1.25)
-        return corner + self._pull((x - 0.4, y), (0.1, 0.35, 0.38), 1.2)
-
-    def frown(self) -> FloatArray:
-        """Corner of the mouth down."""
-        return self._pull(tuple(self.corner), (0.12, -0.85, -0.1), 1.15)
-
-    def stretch(self) -> FloatArray:
-        """Corner of the mouth straight out."""
-        return self._pull(tuple(self.corner), (0.85, -0.12, -0.5), 1.3)
 
     def pucker(self) -> FloatArray:
         """Lips together and forward, as for a kiss."""
@@ -196,13 +173,6 @@ class Muscles:
         """Lower lip off the teeth."""
         return self.lower[:, None] * self._on_lips((0.0, -0.65, 0.05), 0.85)
 
-    def mouth_left(self) -> FloatArray:
-        """The whole mouth to the left."""
-        width = self.build.mouth.width
-        shift = self._pull((0.15 * width, self.build.mouth.centre[1]), (0.9, 0.0, 0.0), 2.1)
-        lift = self._pull(tuple(self.corner), (0.0, 0.15, -0.35), 1.2)
-        return shift + lift
-
     def jaw_open(self) -> FloatArray:
         """Jaw turned about its hinge."""
         y, z = self.build.hinge
@@ -222,12 +192,6 @@ class Muscles:
         """Jaw to the left."""
         return self._jaw()[:, None] * [0.65 * self.build.motion, 0.0, 0.0]
 
-    def _pull(self, centre: tuple[float, ...], way: ArrayLike, radius: float) -> FloatArray:
-        """Everything near a point of the front view moves by `way`, less further away."""
-        distance = np.linalg.norm(self.rest[:, :2] - centre, axis=1) / (radius * self._reach)
-        weight = self.soft * np.exp(-0.5 * distance**2)
-        return np.asarray(self.build.motion * weight[:, None] * np.asarray(way))
-
     def _on_lips(self, way: ArrayLike, radius: float) -> FloatArray:
         return np.asarray(self.build.motion * self._around_lips(radius)[:, None] * np.asarray(way))
 
@@ -241,7 +205,7 @@ class Muscles:
     def _narrow(self, part: float) -> FloatArray:
         """Corners of the mouth in and forward."""
         width = self.build.mouth.width * part / self.build.motion
-        corner = self._pull(tuple(self.corner), (-width, 0.0, 0.35), 1.15)
+        corner = self.pull([(_mouth_corner(self.build), (-width, 0.0, 0.35), 1.15)])
         return corner + self.mirrored(corner)
 
     def _jaw(self) -> FloatArray:

@@ -6,6 +6,7 @@ below the noise of a capture, and it lets compression do its work.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -17,8 +18,7 @@ from facert.data.take import Controls, Source, Take
 from facert.demo import acting, build
 from facert.demo.character import CONTROLS, animate, control_shapes
 from facert.demo.expressions import ACTIVATIONS, expressions
-from facert.demo.head import Head, make_head
-from facert.demo.markers import marker_vertices
+from facert.demo.head import Head, make_head, marker_vertices
 from facert.errors import OutputExistsError
 from facert.io.rig import write_rig
 from facert.io.take import write_take
@@ -45,16 +45,7 @@ def training_take(seed: int = 0, posed: int | None = 40) -> Take:
     params = take.params.copy()
     if posed is not None:
         params[_unposed(len(take), posed, seed)] = np.nan
-    return Take(
-        time=take.time,
-        source=take.source,
-        controls=take.controls,
-        params=params,
-        animation=_old_animation(seed),
-        fps=FPS,
-        units=UNITS,
-        up_axis="y",
-    )
+    return replace(take, params=params, animation=_old_animation(seed))
 
 
 def performance_take(seed: int = 1) -> Take:

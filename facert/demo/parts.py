@@ -1,7 +1,11 @@
-"""The pieces of a head: patches of triangles, left half, made from the proportions alone."""
+"""The pieces of a head: patches of triangles, left half, made from the proportions alone.
+
+The skin is the zero of a field: ellipsoids of clay, joined by soft seams.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -9,12 +13,63 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.demo.build import Build, Colour
-from facert.demo.clay import ORIGIN, cast_from_front, cast_from_inside
+from facert.demo.build import Blob, Build, Colour
 
+ORIGIN = np.array([0.0, 1.0, 0.0])  # inside of the head; every point of the skin is seen from here
+FORWARD = np.array([0.0, -0.36, 0.933])  # from there to the tip of the nose
+_FAR = 40.0
+_BISECTIONS = 48  # 40 cm / 2^48: as fine as float64 allows
 WHITE: Colour = (0.95, 0.93, 0.90)
 TOOTH: Colour = (0.93, 0.90, 0.83)
 PUPIL: Colour = (0.04, 0.03, 0.04)
+
+
+def field(points: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
+    """Roughly the distance to the skin (...,) of points (..., 3): negative inside.
+
+    The head is symmetric, so blobs are given for the left side only.
+    """
+    points = np.concatenate([np.abs(points[..., :1]), points[..., 1:]], axis=-1)
+    distance = _ellipsoid(points, blobs[0])
+    for blob in blobs[1:]:
+        other = _ellipsoid(points, blob)
+        if blob.dig:
+            distance = -_soft_minimum(-distance, other, blob.blend)
+        else:
+            distance = _soft_minimum(distance, other, blob.blend)
+    return distance
+
+
+def cast_from_inside(directions: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
+    """Where rays from the head's inside leave the skin, (n, 3) for unit directions (n, 3)."""
+    return _bisect(np.broadcast_to(ORIGIN, directions.shape), ORIGIN + _FAR * directions, blobs)
+
+
+def cast_from_front(points: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
+    """The skin behind the points (n, 2) of the front view, (n, 3)."""
+    inside = np.column_stack([points, np.zeros(len(points))])
+    return _bisect(inside, inside + np.array([0.0, 0.0, _FAR]), blobs)
+
+
+def _bisect(inside: FloatArray, outside: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
+    """The zero of the field between points inside and outside of the head."""
+    for _ in range(_BISECTIONS):
+        middle = (inside + outside) / 2
+        out = field(middle, blobs)[:, None] > 0
+        inside, outside = np.where(out, inside, middle), np.where(out, middle, outside)
+    return (inside + outside) / 2
+
+
+def _ellipsoid(points: FloatArray, blob: Blob) -> FloatArray:
+    scaled = (points - blob.centre) / blob.radii
+    radius = np.linalg.norm(scaled, axis=-1)
+    slope = np.linalg.norm(scaled / blob.radii, axis=-1)
+    return np.asarray(radius * (radius - 1) / np.maximum(slope, 1e-9))
+
+
+def _soft_minimum(a: FloatArray, b: FloatArray, blend: float) -> FloatArray:
+    overlap = np.maximum(blend - np.abs(a - b), 0) / blend
+    return np.asarray(np.minimum(a, b) - overlap**2 * blend / 4)
 
 
 class Tissue(IntEnum):
@@ -46,6 +101,24 @@ def strips(grid: IntArray, *, closed: bool = False) -> IntArray:
     a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
     faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
     return np.asarray(faces.reshape(-1, 3), dtype=np.int64)
+
+
+def grid_patch(
+    points: FloatArray,
+    colours: ArrayLike,
+    tissue: Tissue = Tissue.SKIN,
+    *,
+    order: slice = slice(None),
+    closed: bool = False,
+) -> Patch:
+    """A patch of a grid of points (R, n, 3), in one colour or one a vertex; see `strips`.
+
+    `order` takes the rows backwards where they run outwards.
+    """
+    vertices = points.reshape(-1, 3)
+    grid = np.arange(len(vertices)).reshape(points.shape[:2])
+    painted = np.array(np.broadcast_to(colours, vertices.shape), dtype=np.float64)
+    return Patch(vertices, strips(grid[order], closed=closed), painted, tissue)
 
 
 def eyeball(build: Build) -> Patch:
@@ -84,8 +157,11 @@ def brow(build: Build) -> Patch:
     )
     width = shape.thickness * np.minimum(1, 0.55 + 3 * along) * np.minimum(1, 2.2 * (1.08 - along))
     rows = [line - width * step * np.array([0.0, 1.0]) for step in (1.0, 0.35, -0.35, -1.0)]
-    lift = np.repeat([-0.05, 0.16, 0.16, -0.05], len(along))
-    return _patch(np.stack(rows), lift, build, build.palette.hair)
+    flat = np.concatenate(rows)
+    skin = cast_from_front(flat, build.blobs)
+    outwards = (skin - ORIGIN) / np.linalg.norm(skin - ORIGIN, axis=1, keepdims=True)
+    lift = np.repeat([-0.05, 0.16, 0.16, -0.05], len(along))[:, None]
+    return grid_patch((skin + lift * outwards).reshape(4, -1, 3), build.palette.hair)
 
 
 def teeth(build: Build) -> tuple[Patch, Patch]:
@@ -98,10 +174,8 @@ def teeth(build: Build) -> tuple[Patch, Patch]:
 
     def row(top: float, bottom: float, tissue: Tissue) -> Patch:
         y = mouth.centre[1] + np.array([bottom, top])
-        vertices = np.stack([np.stack([x, np.full_like(x, level), z], -1) for level in y])
-        colours = np.tile(TOOTH, (vertices.shape[0] * vertices.shape[1], 1))
-        grid = np.arange(2 * len(x)).reshape(2, -1)
-        return Patch(vertices.reshape(-1, 3), strips(grid), colours, tissue)
+        points = np.stack([np.stack([x, np.full_like(x, level), z], -1) for level in y])
+        return grid_patch(points, TOOTH, tissue)
 
     return (
         row(0.5 * height, -0.26 * height, Tissue.SKULL),
@@ -160,16 +234,4 @@ def hair(build: Build) -> Patch:
     height = shape.thickness * np.sqrt(1 - inwards**4) * locks - 0.15 * inwards**6
     vertices = skin + height[..., None] * directions
     vertices[:, [0, -1], 0] = 0
-    grid = np.arange(rows * sides).reshape(rows, sides)
-    colours = np.tile(build.palette.hair, (grid.size, 1))
-    return Patch(vertices.reshape(-1, 3), strips(grid[::-1]), colours, Tissue.SKULL)
-
-
-def _patch(points: FloatArray, lift: ArrayLike, build: Build, colour: Colour) -> Patch:
-    """A grid in front view (R, n, 2), laid on the skin and lifted off it."""
-    flat = points.reshape(-1, 2)
-    vertices = cast_from_front(flat, build.blobs)
-    outwards = (vertices - ORIGIN) / np.linalg.norm(vertices - ORIGIN, axis=1, keepdims=True)
-    vertices = vertices + np.reshape(lift, (-1, 1)) * outwards
-    grid = np.arange(len(flat)).reshape(points.shape[:2])
-    return Patch(vertices, strips(grid), np.tile(colour, (len(flat), 1)))
+    return grid_patch(vertices, build.palette.hair, Tissue.SKULL, order=slice(None, None, -1))
