@@ -11,7 +11,7 @@ from facert.data.arrays import FloatArray, IntArray, checked_names
 from facert.data.names import match, shape_drivers
 from facert.data.resampling import nearest_frames
 from facert.data.rig import Rig
-from facert.data.take import Controls, Take
+from facert.data.take import Controls, Take, named_curves
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -20,7 +20,7 @@ log = logging.getLogger("facert")
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses of a character, each for a frame of a take that is to be told.
+    """Poses of a character, each for a frame of a take that is still to be chosen.
 
     Parameters
     ----------
@@ -145,11 +145,9 @@ def poses_of(take: Take) -> Poses:
     InputError
         When it has markers only.
     """
-    if take.controls is not None and take.params is not None:
-        return Poses(take.controls.names, take.params, take.time, limits=take.controls.limits)
-    if take.source.kind == "weights":
-        return Poses(take.source.names, take.source.values, take.time)
-    raise InputError("/target/params", "poses", "markers only", "Give the file with the poses.")
+    names, values = named_curves(take)
+    limits = None if take.controls is None or take.params is None else take.controls.limits
+    return Poses(names, values, take.time, limits=limits)
 
 
 def weights_as_poses(take: Take, rig: Rig) -> Take:
@@ -170,8 +168,8 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
         raise InputError("/source/names", "names of the rig's shapes", found, "Give another rig.")
     left_out = [name for i, name in enumerate(poses.names) if i not in set(kept)]
     if left_out:
-        told = "no shape for %s, left out: %s"
-        log.warning(told, plural(len(left_out), "weight"), ", ".join(left_out))
+        weights = plural(len(left_out), "weight")
+        log.warning("no shape for %s, left out: %s", weights, ", ".join(left_out))
     values = poses.values[:, kept]
     whole = np.asarray(~np.isnan(values).any(axis=1))
     if not whole.any():

@@ -1,14 +1,14 @@
-"""A take at another frame rate: its values at new times, not its rows counted anew.
+"""Frame rates: that of a recording, and a take at another one.
 
-Between two frames that follow each other values go linearly. What was not observed stays so: a new
-frame between an observed and a hidden one hides it too, and where the recording paused there are
-no new frames.
+A take is resampled by time: its values at new times, not its rows counted anew. Between two
+frames that follow each other values go linearly. What was not observed stays so: a new frame
+between an observed and a hidden one hides it too, and where the recording paused there are no new
+frames.
 """
 
 from __future__ import annotations
 
 import logging
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.take import Source, Take
 from facert.data.text import plural
+from facert.data.timecode import recounted
 from facert.errors import InputError
 
 log = logging.getLogger("facert")
@@ -23,18 +24,19 @@ log = logging.getLogger("facert")
 PAUSE = 1.5
 """A step in time longer than so many nominal frames is a pause of the recording."""
 MAX_FRAMES = 2**22
+ONE_FRAME = 30.0
+"""The nominal rate of a single frame."""
 
 _SAME = 1e-6  # seconds: closer than this, a new frame is the old one
 _SLACK = 1e-4  # of a frame, by which the last one may lie beyond the recording
-_FRAME_CODE = re.compile(r"(\d{1,2}:[0-5]\d:[0-5]\d):(\d{1,3})")
 
 
 def resampled(take: Take, fps: float) -> Take:
     """The take at evenly spaced times, from its first frame on.
 
     A pose between frames without one goes to the new frame that is nearest to it, half a frame away
-    at most; how far poses moved, and those that found no frame, are told in the log. The start
-    timecode counts its frames at the new rate.
+    at most; the log has how far poses moved, and those that found no frame. The start timecode
+    counts its frames at the new rate.
 
     Parameters
     ----------
@@ -66,8 +68,23 @@ def resampled(take: Take, fps: float) -> Take:
         params=params,
         std=std,
         fps=fps,
-        start_timecode=_recounted(take.start_timecode, take.fps, fps),
+        start_timecode=recounted(take.start_timecode, take.fps, fps),
     )
+
+
+def nominal_rate(time: FloatArray) -> float:
+    """Frames a second by the usual spacing of the frames; whole where that is within 1 %.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        Rising seconds, with or without gaps; of anything else, or a single frame, `ONE_FRAME`.
+    """
+    if time.ndim != 1 or len(time) < 2 or not (time[1:] > time[:-1]).all():
+        return ONE_FRAME
+    rate = 1.0 / float(np.median(np.diff(time)))
+    whole = float(np.rint(rate))
+    return whole if abs(rate - whole) <= 0.01 * rate else rate
 
 
 def _new_times(take: Take, fps: float) -> FloatArray:
@@ -135,7 +152,7 @@ def _poses_at(
 def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, IntArray]:
     """New frames that get the pose of an old one as it is, and those old ones.
 
-    These are the old poses that no new frame between two poses tells of.
+    These are the old poses that no new frame between two poses shows.
     """
     known = np.zeros(len(take), dtype=np.bool_)
     known[take.labels] = True
@@ -148,23 +165,14 @@ def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, I
     places, first = np.unique(nearest[order], return_index=True)
     chosen = order[first]
     good = ~between[places] & (shifts[chosen] <= 0.5 / fps + _SAME)
-    _tell_moves(shifts[chosen[good]], len(alone) - int(good.sum()))
+    _log_moves(shifts[chosen[good]], len(alone) - int(good.sum()))
     return places[good], alone[chosen[good]]
 
 
-def _tell_moves(shifts: FloatArray, lost: int) -> None:
+def _log_moves(shifts: FloatArray, lost: int) -> None:
     moved = shifts[shifts > _SAME]
     if len(moved):
         poses, most = plural(len(moved), "pose"), 1e3 * moved.max()
         log.warning("%s moved by up to %.0f ms to the nearest frame", poses, most)
     if lost:
         log.warning("left out %s without a free frame near by", plural(lost, "pose"))
-
-
-def _recounted(start: str, old: float, new: float) -> str:
-    """``HH:MM:SS:FF`` with FF at another rate; any other timecode as it is."""
-    found = _FRAME_CODE.fullmatch(start.strip())
-    if found is None:
-        return start
-    frame = int(int(found[2]) / max(round(old), 1) * round(new) + _SAME)
-    return f"{found[1]}:{frame:02d}"

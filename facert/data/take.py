@@ -231,3 +231,27 @@ class Take:
         if self.params is None:
             return np.empty(0, dtype=np.int64)
         return np.flatnonzero(~np.isnan(self.params[:, 0])).astype(np.int64)
+
+
+def named_columns(take: Take) -> tuple[tuple[str, ...], FloatArray]:
+    """Names and numbers (T, P) of the poses; of the source weights; or of markers, three each."""
+    if take.controls is not None and take.params is not None:
+        return take.controls.names, take.params
+    if take.source.kind == "weights":
+        return take.source.names, take.source.values
+    names = tuple(f"{name}.{axis}" for name in take.source.names for axis in "xyz")
+    return names, take.source.matrix
+
+
+def named_curves(take: Take) -> tuple[tuple[str, ...], FloatArray]:
+    """Names and numbers (T, P) of the poses, or of the source weights.
+
+    Raises
+    ------
+    InputError
+        When there are only markers.
+    """
+    if take.params is None and take.source.kind == "markers":
+        expected, fix = "poses or source weights", "Retarget it first, or write a .csv or .h5 file."
+        raise InputError("/target/params", expected, "markers only", fix)
+    return named_columns(take)

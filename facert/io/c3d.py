@@ -21,7 +21,7 @@ from facert.data.arrays import FloatArray
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.text import MAX_BYTES, existing_file
+from facert.io.guarded import moderate_file, parsing
 
 if TYPE_CHECKING:
     from c3d import Reader
@@ -45,30 +45,20 @@ def read_c3d(path: Path) -> Take:
         Naming the file and what is at fault: no C3D file, fewer frames than it declares, no
         labelled point, or a doubled label.
     """
-    with reading(path):
-        size = existing_file(path).stat().st_size
-        if size > MAX_BYTES:
-            raise InputError("file", f"at most {MAX_BYTES} bytes", f"{size}", "Cut it into parts.")
-        with path.open("rb") as file, _parsing():
-            if file.read(2)[1:] != bytes([_KEY]):
-                raise InputError("file", "a C3D file", "something else", "Export it again.")
-            file.seek(0)
-            return _read(file)
+    with reading(path), moderate_file(path).open("rb") as file, _parsing():
+        if file.read(2)[1:] != bytes([_KEY]):
+            raise InputError("file", "a C3D file", "something else", "Export it again.")
+        file.seek(0)
+        return _read(file)
 
 
 @contextmanager
 def _parsing() -> Iterator[None]:
-    """Blame the file for whatever goes wrong while its bytes are given a meaning."""
-    try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            yield
-    except InputError:
-        raise
-    # Hostile bytes raise struct.error, IndexError, AttributeError and more, which nobody can list.
-    except Exception as error:
-        found = f"damaged data ({error})"
-        raise InputError("file", "a whole C3D file", found, "Export it again.") from error
+    """Blame the file for whatever goes wrong in the block, warnings of the package aside."""
+    quiet = warnings.catch_warnings()
+    with parsing("file", "a whole C3D file"), np.errstate(all="ignore"), quiet:
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _read(file: BinaryIO) -> Take:

@@ -21,11 +21,10 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.take import Source, Take
+from facert.data.take import Source, Take, named_curves
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.columns import named_curves
-from facert.io.text import read_text
+from facert.io.guarded import read_text
 
 _NAMES = ("facsNames", "names", "blendShapeNames")
 _VALUES = ("weightMat", "weights")
@@ -39,7 +38,7 @@ def read_curves(path: Path, fps: float | None = None) -> Take:
     ----------
     path : Path
     fps : float, optional
-        Frames a second where the file does not say.
+        Frames a second where the file does not state it.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Face Cap recordings (TXT): tracked weights of an iPhone.
 
-Lines of cells between commas, each with a word in front: ``info`` tells of the program, ``bs``
-names the shapes, ``k`` is a frame: milliseconds, the head's position and rotation (3 + 3), the
-rotations of the eyes (2 + 2), then a weight a shape.
+Lines of cells between commas, each with a word in front: ``info`` is of the program, ``bs`` names
+the shapes, ``k`` is a frame: milliseconds, the head's position and rotation (3 + 3), the rotations
+of the eyes (2 + 2), then a weight a shape.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from facert.data.names import canonical
+from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError, reading
-from facert.io.rate import nominal_rate
-from facert.io.text import Row, check_width, read_text, to_numbers
+from facert.io.cells import Line, check_width, read_lines, to_numbers
 
 log = logging.getLogger("facert")
 
@@ -34,10 +34,7 @@ def read_facecap(path: Path) -> Take:
         Naming the file and the line that is at fault.
     """
     with reading(path):
-        lines = [
-            Row(number, [cell.strip() for cell in line.split(",")])
-            for number, line in enumerate(read_text(path).splitlines(), start=1)
-        ]
+        lines = read_lines(path, ",")
         names = _shape_names(lines)
         rows = _without_trailing_comma([row for row in lines if row.cells[0] == "k"])
         if not rows:
@@ -55,7 +52,7 @@ def read_facecap(path: Path) -> Take:
         )
 
 
-def _shape_names(lines: Sequence[Row]) -> list[str]:
+def _shape_names(lines: Sequence[Line]) -> list[str]:
     named = [row.cells[1:] for row in lines if row.cells[0] == "bs"]
     if len(named) != 1:
         raise InputError(
@@ -64,5 +61,5 @@ def _shape_names(lines: Sequence[Row]) -> list[str]:
     return named[0] if named[0] and named[0][-1] else named[0][:-1]
 
 
-def _without_trailing_comma(rows: Sequence[Row]) -> list[Row]:
-    return [Row(row.line, row.cells[:-1] if not row.cells[-1] else row.cells) for row in rows]
+def _without_trailing_comma(rows: Sequence[Line]) -> list[Line]:
+    return [Line(row.number, row.cells[:-1] if not row.cells[-1] else row.cells) for row in rows]

@@ -1,7 +1,7 @@
 """GLB (binary glTF 2.0): a mesh with morph targets and an animation of their weights.
 
 A GLB file is a header, a chunk of JSON and a chunk of bytes. All numbers lie in the latter as
-little-endian arrays; the JSON tells of each (an accessor) where it is, its type and its bounds.
+little-endian arrays; the JSON holds of each (an accessor) its place, its type and its bounds.
 Blender, Maya, Unreal and web viewers read the targets' names from the mesh's ``extras``.
 """
 
@@ -31,7 +31,7 @@ _LARGEST = 2**32 - 1
 
 
 class _Buffer:
-    """The bytes of a file in the making, and what the JSON says of them."""
+    """The bytes of a file in the making, and their description in the JSON."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []

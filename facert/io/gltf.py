@@ -1,6 +1,6 @@
 """The guarded door for glTF 2.0: documents (``.gltf``) and binary files (``.glb``).
 
-JSON tells of arrays of numbers (accessors), where they lie in buffers (views), what they mean. All
+JSON describes arrays of numbers (accessors), where they lie in buffers (views), what they mean. All
 of it is foreign: offsets, counts and strides are compared with the bytes there are before an array
 is made. A buffer is in the file itself or in a file beside the document, never elsewhere.
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError, reading
 from facert.io.curves import parse_json_object
-from facert.io.text import MAX_BYTES, existing_file
+from facert.io.guarded import moderate_file, parsing
 
 MAX_VALUES = 2**27
 """Most numbers of one array: 1 GiB of float64."""
@@ -37,7 +37,7 @@ _EMBEDDED = ";base64,"
 
 @dataclass(frozen=True)
 class Document:
-    """What a glTF file says, and its buffers.
+    """The JSON of a glTF file, and its buffers.
 
     Attributes
     ----------
@@ -51,9 +51,9 @@ class Document:
 
     def numbers(self, accessor: int) -> FloatArray:
         """An accessor's numbers (count, width) as float64; normalised integers are 0 to 1."""
-        told = self.root["accessors"][_index(accessor)]
-        values = self._values(told)
-        if not told.get("normalized", False):
+        described = self.root["accessors"][_index(accessor)]
+        values = self._values(described)
+        if not described.get("normalized", False):
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
@@ -64,16 +64,16 @@ class Document:
             raise ValueError("indices that are no unsigned integers")
         return values[:, 0].astype(np.int64)
 
-    def _values(self, told: dict[str, Any]) -> NDArray[Any]:
-        width, count = _WIDTHS[told["type"]], _index(told["count"])
+    def _values(self, accessor: dict[str, Any]) -> NDArray[Any]:
+        width, count = _WIDTHS[accessor["type"]], _index(accessor["count"])
         if count * width > MAX_VALUES:
             raise InputError("accessors", f"at most {MAX_VALUES} numbers", f"{count}", "Cut it.")
-        dtype = _TYPES[told["componentType"]]
+        dtype = _TYPES[accessor["componentType"]]
         values = np.zeros((count, width), dtype)
-        if "bufferView" in told:
-            values = self._view(told, dtype, count, width)
-        if "sparse" in told:
-            sparse = told["sparse"]
+        if "bufferView" in accessor:
+            values = self._view(accessor, dtype, count, width)
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
             changed = _index(sparse["count"])
             places = sparse["indices"]
             rows = self._view(places, _TYPES[places["componentType"]], changed, 1)[:, 0]
@@ -81,10 +81,10 @@ class Document:
             values[rows] = self._view(sparse["values"], dtype, changed, width)
         return values
 
-    def _view(self, told: dict[str, Any], dtype: str, count: int, width: int) -> NDArray[Any]:
+    def _view(self, place: dict[str, Any], dtype: str, count: int, width: int) -> NDArray[Any]:
         """Numbers that lie in a buffer, (count, width)."""
-        view = self.root["bufferViews"][_index(told["bufferView"])]
-        begin, offset = _index(view.get("byteOffset", 0)), _index(told.get("byteOffset", 0))
+        view = self.root["bufferViews"][_index(place["bufferView"])]
+        begin, offset = _index(view.get("byteOffset", 0)), _index(place.get("byteOffset", 0))
         content = self.buffers[_index(view["buffer"])][begin : begin + _index(view["byteLength"])]
         size = np.dtype(dtype).itemsize
         stride = _index(view.get("byteStride", 0)) or width * size
@@ -104,19 +104,12 @@ def open_gltf(path: Path) -> Iterator[Document]:
         When the file is missing, too large, cut short, compressed, or no glTF 2.0.
     """
     path = Path(path)
-    with reading(path):
-        try:
-            yield _document(path)
-        except InputError:
-            raise
-        # A document of wrong types and numbers raises KeyError, TypeError and many more.
-        except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            found = f"damaged or inconsistent data ({error})"
-            raise InputError("file", "valid glTF 2.0", found, "Export it again.") from error
+    with reading(path), parsing("file", "valid glTF 2.0"):
+        yield _document(path)
 
 
 def _document(path: Path) -> Document:
-    content = _content(path)
+    content = moderate_file(path).read_bytes()
     binary = content[:4] == struct.pack("<I", _MAGIC)
     text, own = _chunks(content) if binary else (content, None)
     root = parse_json_object(text)
@@ -127,15 +120,8 @@ def _document(path: Path) -> Document:
         raise InputError(
             "extensionsRequired", "plain geometry", packed[0], "Export it without compression."
         )
-    told = root.get("buffers", [])
-    return Document(root, [_buffer(one, path.parent, own, i) for i, one in enumerate(told)])
-
-
-def _content(path: Path) -> bytes:
-    size = existing_file(path).stat().st_size
-    if size > MAX_BYTES:
-        raise InputError("file", f"at most {MAX_BYTES} bytes", f"{size}", "Cut it into parts.")
-    return path.read_bytes()
+    buffers = enumerate(root.get("buffers", []))
+    return Document(root, [_buffer(one.get("uri"), path.parent, own, i) for i, one in buffers])
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
@@ -156,8 +142,8 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
     return content[20 : 20 + length], rest[8 : 8 + size] if other == _BINARY else None
 
 
-def _buffer(told: dict[str, Any], folder: Path, own: bytes | None, number: int) -> bytes:
-    uri = told.get("uri")
+def _buffer(uri: Any, folder: Path, own: bytes | None, number: int) -> bytes:
+    """The bytes of a buffer: the file's own chunk, in the URI, or in a file beside it."""
     if uri is None and number == 0 and own is not None:
         return own
     if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:
@@ -170,7 +156,7 @@ def _buffer(told: dict[str, Any], folder: Path, own: bytes | None, number: int) 
         raise InputError(
             "buffers", "data in the file or beside it", f"{uri!r}", "Export it as one .glb file."
         )
-    return _content(folder / name)
+    return moderate_file(folder / name).read_bytes()
 
 
 def _index(value: Any) -> int:

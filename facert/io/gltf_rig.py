@@ -24,17 +24,15 @@ log = logging.getLogger("facert")
 
 _TRIANGLES = 4
 _GAMMA = 2.2
-
-
 UNITS = "m"
 
 
 @dataclass(frozen=True, eq=False)
 class _Primitive:
-    """Triangles in the document: their mesh, what it says of them, where the scene places them."""
+    """Triangles in the document: their mesh, its entry of them, where the scene places them."""
 
     mesh: dict[str, Any]
-    told: dict[str, Any]
+    entry: dict[str, Any]
     targets: list[dict[str, Any]]
     world: FloatArray  # (4, 4)
 
@@ -94,7 +92,7 @@ def _primitives(document: Document) -> Iterator[_Primitive]:
         if "mesh" not in node:
             continue
         mesh = document.root["meshes"][node["mesh"]]
-        # Of a skinned mesh the joints tell the place; in their rest pose it stays where it is.
+        # Of a skinned mesh the joints decide the place; in their rest pose it stays where it is.
         placed = np.eye(4) if "skin" in node else world
         for one in mesh["primitives"]:
             if one.get("mode", _TRIANGLES) == _TRIANGLES:
@@ -102,7 +100,7 @@ def _primitives(document: Document) -> Iterator[_Primitive]:
 
 
 def _part(document: Document, one: _Primitive) -> _Part:
-    attributes = one.told["attributes"]
+    attributes = one.entry["attributes"]
     vertices = _vectors(document, attributes["POSITION"])
     _require_moderate(len(one.targets), len(vertices))
     moved = np.zeros((len(one.targets), *vertices.shape))
@@ -110,8 +108,8 @@ def _part(document: Document, one: _Primitive) -> _Part:
         if "POSITION" in target:
             moved[index] = _vectors(document, target["POSITION"])
     indices = np.arange(len(vertices))
-    if "indices" in one.told:
-        indices = document.integers(one.told["indices"])
+    if "indices" in one.entry:
+        indices = document.integers(one.entry["indices"])
     colours = document.numbers(attributes["COLOR_0"])[:, :3] if "COLOR_0" in attributes else None
     turn, place = one.world[:3, :3], one.world[:3, 3]
     return _Part(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,14 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
 from facert.io.gltf_rig import target_names
-from facert.io.rate import nominal_rate
+from facert.io.registry import Kind
+
+log = logging.getLogger("facert")
 
 _FASTEST = 240.0  # frames a second
 _CLOSE = 0.05  # the share of the steps between keys that are as close as frames, at least
@@ -30,16 +34,16 @@ class _Curves:
     interpolation: str
 
 
-def read_gltf_take(path: Path, animation: str | None = None) -> Take:
+def read_gltf_take(path: Path, target: str | None = None) -> Take:
     """Read the animation of morph targets as a take whose source is weights.
 
     Every key is a frame; between keys that lie farther apart than frames, there are others, which
-    are sampled as the file says that keys are interpolated.
+    are sampled by the file's own interpolation.
 
     Parameters
     ----------
     path : Path
-    animation : str, optional
+    target : str, optional
         Which of several animations.
 
     Raises
@@ -48,7 +52,7 @@ def read_gltf_take(path: Path, animation: str | None = None) -> Take:
         When the file cannot be read safely, or holds no animation of weights, or several.
     """
     with open_gltf(path) as document:
-        curves = _chosen(document, animation)
+        curves = _chosen(document, target)
         time, rate = _frame_times([one.time for one in curves])
         names = tuple(dict.fromkeys(name for one in curves for name in one.names))
         if len(time) * len(names) > MAX_VALUES:
@@ -59,10 +63,14 @@ def read_gltf_take(path: Path, animation: str | None = None) -> Take:
         return Take(time=time, source=Source(values, names), fps=rate)
 
 
-def holds_animation(path: Path) -> bool:
-    """Whether a glTF file animates the weights of morph targets."""
-    with open_gltf(path) as document:
-        return any(_channels(one) for one in document.root.get("animations", []))
+def kind_of(path: Path, asked: Kind | None = None) -> Kind:
+    """What was asked for, else the rig: the animation of morph targets is a take beside it."""
+    if asked is None:
+        with open_gltf(path) as document:
+            animated = any(_channels(one) for one in document.root.get("animations", []))
+        if animated:
+            log.info("%s: this is the rig; its animation is a take as well", path.name)
+    return asked or "rig"
 
 
 def _channels(animation: dict[str, Any]) -> list[dict[str, Any]]:

@@ -12,18 +12,20 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.rig import Mesh
 from facert.data.version import CREATED_BY
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.text import existing_file
+from facert.io.guarded import existing_file
 
+TAKE_FORMAT, RIG_FORMAT = "facert-take", "facert-rig"
 MAX_VALUES = 2**27
 """Most values of one dataset: 1 GiB of float64."""
 MAX_NAMES = 2**14
@@ -91,6 +93,19 @@ class GuardedFile:
             if sum(map(len, names)) > MAX_TEXT:
                 raise _unexpected(path, f"at most {MAX_TEXT} characters", "more")
         return tuple(names)
+
+    def optional(self, path: str) -> FloatArray | None:
+        """The numbers at `path`, if there is anything."""
+        return self.numbers(path) if path in self else None
+
+    def mesh(self) -> Mesh:
+        """The mesh at rest that a rig and a mesh sequence have."""
+        return Mesh(
+            vertices=self.numbers("/neutral"),
+            faces=self.integers("/faces"),
+            units=self.text_attribute("units"),
+            colours=self.optional("/colours"),
+        )
 
     def text_attribute(self, name: str, default: str = "") -> str:
         """Read a text attribute of the root."""
@@ -228,11 +243,16 @@ def open_guarded(path: Path) -> Iterator[GuardedFile]:
 
 
 def stated_format(path: Path) -> str:
-    """What an HDF5 file says that it is; empty for a file of another kind, or none."""
+    """The format that an HDF5 file states; empty for a file of another kind, or none."""
     if not h5py.is_hdf5(path):
         return ""
     with open_guarded(path) as file:
         return file.text_attribute("format")
+
+
+def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
+    """A rig where the file states that it is one; else it has to be a take."""
+    return "rig" if stated_format(path) == RIG_FORMAT else "take"
 
 
 class NewFile:
@@ -241,10 +261,18 @@ class NewFile:
     def __init__(self, file: h5py.File) -> None:
         self._file = file
 
-    def array(self, path: str, values: NDArray[Any]) -> None:
-        """Write an array, compressed unless there is nothing in it."""
-        packing = {"compression": "gzip", "shuffle": True} if values.size else {}
-        self._file.create_dataset(path, data=values, **packing)
+    def array(self, path: str, values: NDArray[Any] | None) -> None:
+        """Write an array, compressed unless there is nothing in it; None is left out."""
+        if values is not None:
+            packing = {"compression": "gzip", "shuffle": True} if values.size else {}
+            self._file.create_dataset(path, data=values, **packing)
+
+    def mesh(self, mesh: Mesh) -> None:
+        """Write the mesh at rest of a rig or a mesh sequence."""
+        self.attribute("units", mesh.units)
+        self.array("/neutral", mesh.vertices)
+        self.array("/faces", mesh.faces)
+        self.array("/colours", mesh.colours)
 
     def rows(self, path: str, shape: tuple[int, ...]) -> NewRows:
         """A float32 dataset that is filled row by row.
@@ -284,7 +312,7 @@ class NewRows:
 
 @contextmanager
 def create(path: Path, format_name: str, version: int, overwrite: bool) -> Iterator[NewFile]:
-    """Make a new HDF5 file that says what it is; it appears when the block ends well.
+    """Make a new HDF5 file that states its format; it appears when the block ends well.
 
     Raises
     ------

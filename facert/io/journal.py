@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from facert.errors import InputError, reading
-from facert.io.text import read_text
+from facert.io.guarded import read_text
 
 log = logging.getLogger(__name__)
 
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 class Journal:
     """A file to which finished work is added line by line.
 
-    Its first line tells which work it belongs to. A journal of other work is begun anew; a last
+    Its first line states which work it belongs to. A journal of other work is begun anew; a last
     line that was cut off is passed over.
 
     Parameters

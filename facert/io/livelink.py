@@ -2,7 +2,11 @@
 
 One row an observation: ``Timecode,BlendShapeCount``, then the 52 ARKit shapes and nine angles in
 radians. Columns are found by name: 51, 52 and 61 of them occur, in several spellings. Rows come
-with gaps, and a row whose count is 0 saw no face; `livelink_clock` reads the timecodes.
+with gaps, and a row whose count is 0 saw no face.
+
+The app counts FF of a timecode in 1/60 s whatever the rate of the rows, with thousandths; other
+writers of the same table count the frames of their own rate, 24 to 50 a second. Which of both a
+file does shows where the seconds change.
 """
 
 from __future__ import annotations
@@ -16,34 +20,27 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.names import ARKIT_NAMES, canonical, match, nearest
-from facert.data.take import Source, Take
+from facert.data.resampling import nominal_rate
+from facert.data.take import Source, Take, named_curves
 from facert.data.text import plural
+from facert.data.timecode import (
+    DAY,
+    LIVE_LINK_RATE,
+    TICKS,
+    format_timecode,
+    has_thousandths,
+    parse_timecode,
+)
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.livelink_clock import (
-    APP_COUNT,
-    TICKS,
-    counted,
-    format_timecode,
-    parse_timecode,
-    says_its_count,
-    unwrap_midnight,
-)
-from facert.io.rate import nominal_rate
-from facert.io.text import Row, check_width, read_csv, to_numbers
-
-__all__ = [
-    "TICKS",
-    "format_timecode",
-    "is_livelink",
-    "parse_timecode",
-    "read_livelink",
-    "write_livelink",
-]
+from facert.io.cells import Line, check_width, read_csv, to_numbers
 
 log = logging.getLogger("facert")
 
 _LEADING = ("Timecode", "BlendShapeCount")
+_OTHER_COUNTS = (24, 25, 30, 48, 50)
+# So many steps within seconds, and from one second to the next, show what a second counts.
+_ENOUGH_STEPS, _ENOUGH_SECONDS = 10, 2
 
 
 def is_livelink(header: Sequence[str]) -> bool:
@@ -120,7 +117,8 @@ def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
             "Fill the gaps first (facert retarget does), or write a .csv table.",
         )
     code = take.start_timecode or "00:00:00:00.000"
-    start = parse_timecode(code, APP_COUNT if says_its_count(code) else max(1, round(take.fps)))
+    counted = LIVE_LINK_RATE if has_thousandths(code) else max(1, round(take.fps))
+    start = parse_timecode(code, counted)
     if start is None:  # FF beyond the rate: the app's sixtieths, written short
         start = parse_timecode(code)
     if start is None:
@@ -130,14 +128,12 @@ def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
     return start + np.rint(take.time * TICKS).astype(np.int64), columns
 
 
-def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
+def _rows_with_face(rows: Sequence[Line]) -> list[Line]:
     kept = [row for row in rows if _saw_face(row)]
     if len(kept) < len(rows):
-        log.info(
-            "dropped %d of %d rows without a face: frames are counted without them",
-            len(rows) - len(kept),
-            len(rows),
-        )
+        dropped = len(rows) - len(kept)
+        text = "dropped %d of %d rows without a face: frames are counted without them"
+        log.info(text, dropped, len(rows))
     if not kept:
         raise InputError(
             "BlendShapeCount", "rows with a face", "none", "Record again with the face in view."
@@ -145,49 +141,58 @@ def _rows_with_face(rows: Sequence[Row]) -> list[Row]:
     return kept
 
 
-def _saw_face(row: Row) -> bool:
+def _saw_face(row: Line) -> bool:
     """Whether the row counts any shapes; a row may end after its timecode."""
     count = "".join(row.cells[1:2]).strip()
     try:
         return float(count or 0) > 0
     except ValueError:
-        raise InputError(
-            f"line {row.line}, column BlendShapeCount",
-            "the number of shapes, or 0 for no face",
-            repr(count[:40]),
-            "Mend or remove the line.",
-        ) from None
+        expected = "the number of shapes, or 0 for no face"
+        raise row.error(_LEADING[1], expected, repr(count[:40])) from None
 
 
-def _clock(rows: Sequence[Row]) -> tuple[IntArray, int]:
+def _clock(rows: Sequence[Line]) -> tuple[IntArray, int]:
     """Ticks of the rows (T,), and how many FF of their timecodes make a second."""
     ticks = [_row_ticks(row) for row in rows]
-    count = counted(ticks)
-    if count != APP_COUNT:
+    count = _counted(ticks)
+    if count != LIVE_LINK_RATE:
         log.info("timecodes count %d frames a second", count)
-        ticks = [tick // TICKS * TICKS + tick % TICKS * APP_COUNT // count for tick in ticks]
-    return unwrap_midnight(np.array(ticks, dtype=np.int64)), count
+        ticks = [tick // TICKS * TICKS + tick % TICKS * LIVE_LINK_RATE // count for tick in ticks]
+    clock = np.array(ticks, dtype=np.int64)
+    new_days = np.diff(clock, prepend=clock[:1]) < -DAY // 2  # time goes on past midnight
+    return clock + DAY * np.cumsum(new_days), count
+
+
+def _counted(ticks: Sequence[int]) -> int:
+    """How many FF make a second, as the ticks of the rows (T,) show; else 60 as the app has it.
+
+    Where FF wraps from one second to the next, its usual step goes on only with the right count.
+    """
+    seconds, frames = np.divmod(np.asarray(ticks, dtype=np.float64), TICKS)
+    frames *= LIVE_LINK_RATE / TICKS
+    steps, passed = np.diff(frames), np.diff(seconds)
+    within, across = steps[passed == 0], steps[passed == 1]
+    if len(within) < _ENOUGH_STEPS or len(across) < _ENOUGH_SECONDS:
+        return LIVE_LINK_RATE
+    shown = np.median(np.median(within) - across)
+    fitting = [n for n in _OTHER_COUNTS if abs(shown - n) < 0.5 and frames.max() < n]
+    return fitting[0] if fitting else LIVE_LINK_RATE
 
 
 def _start(code: str, ticks: int, count: int, rate: float) -> str:
-    """The first timecode, of these ticks, so that whoever reads it alone can tell how it counts.
+    """The first timecode, of these ticks, so that its count shows when it is read alone.
 
     With thousandths that is 1/60 s, without them frames at the take's own rate.
     """
-    if count == (APP_COUNT if says_its_count(code) else round(rate)):
+    if count == (LIVE_LINK_RATE if has_thousandths(code) else round(rate)):
         return code
     return format_timecode(ticks)
 
 
-def _row_ticks(row: Row) -> int:
+def _row_ticks(row: Line) -> int:
     ticks = parse_timecode(row.cells[0])
     if ticks is None:
-        raise InputError(
-            f"line {row.line}, column Timecode",
-            "HH:MM:SS:FF.mmm",
-            repr(row.cells[0][:40]),
-            "Mend or remove the line.",
-        )
+        raise row.error(_LEADING[0], "HH:MM:SS:FF.mmm", repr(row.cells[0][:40]))
     return ticks
 
 
@@ -202,7 +207,7 @@ def _rising(ticks: IntArray) -> IntArray:
 
 
 def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:
-    """ARKit's spelling of the columns; a column that is not ARKit's stays, and is told about."""
+    """ARKit's spelling of the columns; a column that is not ARKit's stays, with a warning."""
     names = tuple(canonical(column) for column in header)
     for name in (name for name in names if name not in ARKIT_NAMES):
         near = nearest(name, ARKIT_NAMES)
@@ -213,14 +218,8 @@ def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:
 
 def _arkit_columns(take: Take) -> FloatArray:
     """What to write, (T, 61): the poses, else the source weights, in the order of the CSV."""
-    if take.controls is not None and take.params is not None:
-        names, values, field = take.controls.names, take.params, "/target/names"
-    elif take.source.kind == "weights":
-        names, values, field = take.source.names, take.source.values, "/source/names"
-    else:
-        raise InputError(
-            "/target/params", "poses or source weights", "markers only", "Write a .csv or .h5 file."
-        )
+    names, values = named_curves(take)
+    field = "/source/names" if take.params is None else "/target/names"
     foreign = [name for name in names if canonical(name) not in ARKIT_NAMES]
     if foreign:
         near = nearest(foreign[0], ARKIT_NAMES)

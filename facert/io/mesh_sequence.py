@@ -89,12 +89,8 @@ def new_mesh_sequence(
     require_time(time, len(time), fps)
     with create(path, FORMAT, VERSION, overwrite) as file:
         file.attribute("fps", fps)
-        file.attribute("units", neutral.units)
         file.array("/time", time)
-        file.array("/faces", neutral.faces)
-        file.array("/neutral", neutral.vertices)
-        if neutral.colours is not None:
-            file.array("/colours", neutral.colours)
+        file.mesh(neutral)
         rows = file.rows("/vertices", (len(time), *neutral.vertices.shape))
         yield SequenceWriter(rows)
         if rows.filled != len(time):
@@ -110,7 +106,7 @@ def write_mesh_sequence(sequence: MeshSequence, path: Path, overwrite: bool = Fa
 
 
 def holds_mesh_sequence(path: Path) -> bool:
-    """Whether a file says that it is a mesh sequence; any other file, or none, is not."""
+    """Whether a file states that it is a mesh sequence; any other file, or none, is not."""
     return stated_format(path) == FORMAT
 
 
@@ -129,21 +125,12 @@ def open_mesh_sequence(path: Path) -> Iterator[MeshSequence]:
 
 
 def _sequence(file: GuardedFile, path: Path) -> MeshSequence:
-    neutral = Mesh(
-        vertices=file.numbers("/neutral"),
-        faces=file.integers("/faces"),
-        units=file.text_attribute("units"),
-        colours=file.numbers("/colours") if "/colours" in file else None,
-    )
+    neutral = file.mesh()
     time, rows = file.numbers("/time"), file.rows("/vertices")
     expected = (len(time), *neutral.vertices.shape)
     if rows.shape != expected:
-        raise InputError(
-            "/vertices",
-            f"shape {expected}",
-            f"{rows.shape}",
-            "Write all vertices of every frame.",
-        )
+        fix = "Write all vertices of every frame."
+        raise InputError("/vertices", f"shape {expected}", f"{rows.shape}", fix)
 
     def fetch(frames: IntArray) -> FloatArray:
         with reading(path):  # by then, other files may be open as well

@@ -18,20 +18,20 @@ import math
 import zipfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.resampling import nominal_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, reading
-from facert.io.rate import nominal_rate
-from facert.io.text import existing_file
+from facert.io.guarded import existing_file, parsing
 
 NO_TARGET = ""
 """Asks for the source alone of a file with several targets."""
@@ -93,16 +93,10 @@ class Archive:
             return np.asarray(npy_format.read_array(stream, allow_pickle=False))
 
 
-@contextmanager
-def _parsing(key: str) -> Iterator[None]:
-    """Blame the file for whatever goes wrong while its bytes are made an array or text."""
-    try:
-        yield
-    # NumPy evaluates a header as Python source and trusts its numbers and code points: hostile
-    # bytes raise TokenError, OverflowError, SystemError and more, which nobody can list.
-    except Exception as error:
-        found = "damaged data, or less than the array declares"
-        raise InputError(key, "a whole array", found, "Store it anew.") from error
+def _parsing(key: str) -> AbstractContextManager[None]:
+    """Blame the file: NumPy evaluates a header as Python source, and trusts its numbers."""
+    found = "damaged data, or less than the array declares"
+    return parsing(key, "a whole array", "Store it anew.", found)
 
 
 @contextmanager
@@ -126,10 +120,10 @@ def open_archive(path: Path) -> Iterator[Archive]:
             yield Archive(file)
 
 
-def holds_rig(path: Path) -> bool:
-    """Tell a rig (it has a neutral and faces) from a track."""
+def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
+    """A rig has a neutral and faces; anything else is a track."""
     with open_archive(path) as archive:
-        return "neutral" in archive and "faces" in archive
+        return "rig" if "neutral" in archive and "faces" in archive else "take"
 
 
 def read_npz_take(path: Path, target: str | None = None, fps: float | None = None) -> Take:
@@ -139,9 +133,9 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
     ----------
     path : Path
     target : str, optional
-        Which of several targets; one alone, or none, needs no telling. `NO_TARGET`: none of them.
+        Which of several targets; one alone, or none, needs no choice. `NO_TARGET`: none of them.
     fps : float, optional
-        Frames a second where the file does not say.
+        Frames a second where the file does not state it.
 
     Raises
     ------
@@ -157,14 +151,16 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
         return Take(time=time, source=source, controls=controls, params=params, fps=rate)
 
 
-def read_targets(path: Path) -> dict[str, tuple[str, ...]]:
-    """The targets of a track, and the controls of each.
+def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
+    """The targets of a track, and the controls of each; none of a rig, or where there is no file.
 
     Raises
     ------
     InputError
         When the file is no .npz archive, or names in it are damaged.
     """
+    if not path.is_file() or kind_of(path) == "rig":
+        return {}
     with open_archive(path) as archive:
         return {key: archive.names(_names_key(key, archive)) for key in _targets(archive)}
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.rig import Rig
+from facert.data.rig import Mesh, Rig
 from facert.errors import InputError, reading
-from facert.io.text import read_text
+from facert.io.guarded import read_text
 
 log = logging.getLogger("facert")
 
@@ -42,21 +42,27 @@ def read_obj_folder(folder: Path) -> Rig:
             "Export the rest pose under that name, and every shape beside it.",
             where=str(folder),
         )
-    neutral, faces = read_obj(neutral_file)
+    neutral, faces = _vertices_and_faces(neutral_file)
     shapes = [_read_shape(path, neutral, faces) - neutral for path in shape_files]
     with reading(folder):
         names = tuple(path.stem for path in shape_files)
         return Rig(neutral=neutral, shapes=np.stack(shapes), names=names, faces=faces)
 
 
-def read_obj(path: Path) -> tuple[FloatArray, IntArray]:
-    """Read the vertices (V, 3) and the triangles (F, 3) of one OBJ file.
+def read_obj(path: Path) -> Mesh:
+    """Read the mesh of one OBJ file.
 
     Raises
     ------
     InputError
         Naming the file and the line that is at fault.
     """
+    with reading(path):
+        return Mesh(*_vertices_and_faces(path))
+
+
+def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
+    """The vertices (V, 3) and the triangles (F, 3) of one OBJ file."""
     vertices: list[list[float]] = []
     triangles: list[list[int]] = []
     with reading(path):
@@ -80,7 +86,7 @@ def read_obj(path: Path) -> tuple[FloatArray, IntArray]:
 
 
 def _read_shape(path: Path, neutral: FloatArray, faces: IntArray) -> FloatArray:
-    vertices, own_faces = read_obj(path)
+    vertices, own_faces = _vertices_and_faces(path)
     if vertices.shape != neutral.shape:
         raise InputError(
             "vertices",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.errors import InputError, reading
-from facert.io.text import MAX_BYTES, existing_file
+from facert.io.guarded import moderate_file
 
 MAX_HEADER = 2**16
 MAX_RAGGED = 2**22
@@ -67,10 +67,7 @@ def read_ply(path: Path) -> Mesh:
         Naming the file, and the line of the header or the element that is at fault.
     """
     with reading(path):
-        size = existing_file(path).stat().st_size
-        if size > MAX_BYTES:
-            raise InputError("file", f"at most {MAX_BYTES} bytes", f"{size}", "Cut it into parts.")
-        content = path.read_bytes()
+        content = moderate_file(path).read_bytes()
         end = _end_of_header(content)
         header = _parse_header(content[:end])
         body = _as_float64(content[end:]) if header.text else content[end:]

@@ -12,8 +12,8 @@ from facert.data.labelling import Poses, poses_of, predicted_poses
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
+from facert.io.cells import check_width, read_csv, read_header, to_numbers
 from facert.io.formats import read_take_file
-from facert.io.text import check_width, read_csv, read_header, to_numbers
 
 log = logging.getLogger("facert")
 
@@ -70,12 +70,7 @@ def _read_numbered(path: Path) -> Poses:
     odd = np.flatnonzero(~((numbers == np.rint(numbers)) & (np.abs(numbers) < MAX_FRAMES)))
     if len(odd):
         row = rows[odd[0]]
-        raise InputError(
-            f"line {row.line}, column {header[place]}",
-            "a frame's number",
-            repr(row.cells[place]),
-            "Give whole numbers, from 0.",
-        )
+        raise row.error(header[place], "a frame's number, whole and from 0", repr(row.cells[place]))
     return Poses(
         names=tuple(header[column] for column in columns),
         values=to_numbers(rows, header, columns),

@@ -15,9 +15,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from facert.data.rig import Rig
-from facert.io.hdf5 import create, open_guarded
+from facert.io.hdf5 import RIG_FORMAT, create, open_guarded
 
-FORMAT = "facert-rig"
 VERSION = 1
 
 
@@ -30,15 +29,9 @@ def read_rig(path: Path) -> Rig:
         Naming the file and the HDF5 path that is at fault.
     """
     with open_guarded(path) as file:
-        file.require_format(FORMAT, VERSION)
-        return Rig(
-            neutral=file.numbers("/neutral"),
-            shapes=file.numbers("/shapes"),
-            names=file.names("/names"),
-            faces=file.integers("/faces"),
-            units=file.text_attribute("units"),
-            colours=file.numbers("/colours") if "/colours" in file else None,
-        )
+        file.require_format(RIG_FORMAT, VERSION)
+        mesh, shapes, names = file.mesh(), file.numbers("/shapes"), file.names("/names")
+        return Rig(mesh.vertices, shapes, names, mesh.faces, mesh.units, mesh.colours)
 
 
 def write_rig(rig: Rig, path: Path, overwrite: bool = False) -> None:
@@ -49,11 +42,7 @@ def write_rig(rig: Rig, path: Path, overwrite: bool = False) -> None:
     OutputExistsError
         When `path` exists and `overwrite` is not set.
     """
-    with create(path, FORMAT, VERSION, overwrite) as file:
-        file.attribute("units", rig.units)
-        file.array("/neutral", rig.neutral)
+    with create(path, RIG_FORMAT, VERSION, overwrite) as file:
+        file.mesh(rig.mesh)
         file.array("/shapes", rig.shapes)
         file.names("/names", rig.names)
-        file.array("/faces", rig.faces)
-        if rig.colours is not None:
-            file.array("/colours", rig.colours)

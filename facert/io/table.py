@@ -16,14 +16,21 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.take import Source, Take
+from facert.data.resampling import nominal_rate
+from facert.data.take import Source, Take, named_columns
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.columns import named_columns
-from facert.io.rate import nominal_rate
-from facert.io.text import check_width, read_csv, to_numbers
+from facert.io.cells import check_width, read_csv, read_header, to_numbers
+from facert.io.livelink import is_livelink, read_livelink
 
 _COORDINATE = re.compile(r"(.+)[._]([xyz])", re.IGNORECASE)
+
+
+def read_csv_take(path: Path, fps: float | None = None) -> Take:
+    """Read a CSV file by its header: one of Live Link Face, or else a table."""
+    with reading(path):
+        livelink = is_livelink(read_header(path))
+    return read_livelink(path) if livelink else read_table(path, fps)
 
 
 def read_table(path: Path, fps: float | None = None) -> Take:
@@ -33,7 +40,7 @@ def read_table(path: Path, fps: float | None = None) -> Take:
     ----------
     path : Path
     fps : float, optional
-        Frames a second of a column ``frame``; a column ``time`` tells by itself.
+        Frames a second of a column ``frame``; a column ``time`` needs none.
 
     Raises
     ------

@@ -34,9 +34,8 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.io.hdf5 import GuardedFile, NewFile, create, open_guarded
+from facert.io.hdf5 import TAKE_FORMAT, GuardedFile, NewFile, create, open_guarded
 
-FORMAT = "facert-take"
 VERSION = 1
 
 
@@ -49,14 +48,14 @@ def read_take(path: Path) -> Take:
         Naming the file and the HDF5 path that is at fault.
     """
     with open_guarded(path) as file:
-        file.require_format(FORMAT, VERSION)
+        file.require_format(TAKE_FORMAT, VERSION)
         return Take(
             time=file.numbers("/time"),
             source=_read_source(file),
             controls=_read_controls(file),
-            params=_optional(file, "/target/params"),
-            std=_optional(file, "/target/std"),
-            animation=_optional(file, "/animation/params"),
+            params=file.optional("/target/params"),
+            std=file.optional("/target/std"),
+            animation=file.optional("/animation/params"),
             fps=file.number_attribute("fps"),
             units=file.text_attribute("units"),
             start_timecode=file.text_attribute("start_timecode"),
@@ -86,7 +85,7 @@ def write_take(
     OutputExistsError
         When `path` exists and `overwrite` is not set.
     """
-    with create(path, FORMAT, VERSION, overwrite) as file:
+    with create(path, TAKE_FORMAT, VERSION, overwrite) as file:
         file.attribute("fps", take.fps)
         file.attribute("units", take.units)
         file.attribute("start_timecode", take.start_timecode)
@@ -118,7 +117,7 @@ def _read_source(file: GuardedFile) -> Source:
 
 
 def _apply_valid(values: FloatArray, file: GuardedFile) -> None:
-    """Set to NaN what the file says was not observed."""
+    """Set to NaN what was not observed by the file's flags."""
     valid = file.flags("/source/valid")
     if valid.shape != values.shape[:2]:
         raise InputError(
@@ -133,32 +132,21 @@ def _apply_valid(values: FloatArray, file: GuardedFile) -> None:
 def _read_controls(file: GuardedFile) -> Controls | None:
     if "/target/names" not in file:
         return None
-    return Controls(file.names("/target/names"), _optional(file, "/target/limits"))
-
-
-def _optional(file: GuardedFile, path: str) -> FloatArray | None:
-    return file.numbers(path) if path in file else None
+    return Controls(file.names("/target/names"), file.optional("/target/limits"))
 
 
 def _write_source(file: NewFile, source: Source) -> None:
     file.array(f"/source/{source.kind}", source.values)
     file.names("/source/names", source.names)
-    if not source.valid.all():
-        file.array("/source/valid", source.valid)
-    if source.std is not None:
-        file.array("/source/std", source.std)
+    file.array("/source/valid", None if source.valid.all() else source.valid)
+    file.array("/source/std", source.std)
 
 
 def _write_target(file: NewFile, take: Take) -> None:
     if take.controls is None:
         return
     file.names("/target/names", take.controls.names)
-    arrays = {
-        "/target/limits": take.controls.limits,
-        "/target/params": take.params,
-        "/target/std": take.std,
-        "/animation/params": take.animation,
-    }
-    for path, values in arrays.items():
-        if values is not None:
-            file.array(path, values)
+    file.array("/target/limits", take.controls.limits)
+    file.array("/target/params", take.params)
+    file.array("/target/std", take.std)
+    file.array("/animation/params", take.animation)

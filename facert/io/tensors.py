@@ -19,7 +19,7 @@ from safetensors.numpy import load, save
 from facert.data.arrays import FloatArray
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.text import existing_file
+from facert.io.guarded import moderate_file
 
 MAX_HEADER = 16 << 20  # bytes
 MAX_FILE = 4 << 30
@@ -79,10 +79,7 @@ def read_tensors(path: Path, expected: str) -> tuple[dict[str, FloatArray], dict
 
 
 def _read_checked(path: Path) -> bytes:
-    size = existing_file(path).stat().st_size
-    if size > MAX_FILE:
-        raise _damaged("the file", f"at most {MAX_FILE} bytes", f"{size}")
-    content = path.read_bytes()
+    content = moderate_file(path, MAX_FILE).read_bytes()
     length = _header_length(content)
     if length > min(MAX_HEADER, len(content) - 8) or content[8:9] != b"{":
         raise _damaged("the header", "a safetensors file", "something else or a truncated file")

@@ -1,13 +1,26 @@
-"""What a person writes in a TOML file."""
+"""What a person writes in a TOML file: any table; the regions of a face.
+
+[brows-and-eyes]
+markers = ["browLeft", "browRight"]
+controls = ["browInnerUp", "eyeBlinkLeft"]
+"""
 
 from __future__ import annotations
 
+import json
+import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from facert.data.regions import Regions
 from facert.errors import InputError, reading
-from facert.io.text import read_text
+from facert.io.guarded import read_text
+
+REGIONS_EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
+WIDTH = 100
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
@@ -28,6 +41,43 @@ def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
         try:
             return tomllib.loads(read_text(path))
         except (ValueError, RecursionError) as error:
-            raise InputError(
-                "file", f"TOML such as {example}", f"{error}", "Correct the file."
-            ) from error
+            expected = f"TOML such as {example}"
+            raise InputError("file", expected, f"{error}", "Correct the file.") from error
+
+
+def read_regions(path: Path) -> Regions:
+    """The regions in a file: a table a region; `Regions.matched` checks them against a take.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, too large, not TOML, or holds anything else.
+    """
+    with reading(path):
+        return Regions.of(read_toml(path, REGIONS_EXAMPLE))
+
+
+def regions_text(regions: Regions) -> str:
+    """TOML of regions, as `read_regions` reads it, for a person to edit."""
+    tables = [
+        f"[{name if _BARE.fullmatch(name) else _quoted(name)}]\n"
+        + "".join(f"{key} = [\n{_listed(names)}\n]\n" for key, names in table.items())
+        for name, table in regions.tables.items()
+    ]
+    return "\n".join(tables)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in lines that fit a terminal; a space in a name is no place to break."""
+    lines, line = [], "   "
+    for name in map(_quoted, names):
+        if len(line) + len(name) + 2 > WIDTH:
+            lines.append(line)
+            line = "   "
+        line += f" {name},"
+    return "\n".join([*lines, line])
+
+
+def _quoted(name: str) -> str:
+    """A basic string of TOML; JSON spells all but one sign as it does."""
+    return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")

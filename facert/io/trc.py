@@ -12,17 +12,16 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.rate import nominal_rate
-from facert.io.text import Row, read_text, to_numbers
+from facert.io.cells import Line, read_lines, to_numbers
 
 log = logging.getLogger("facert")
 
@@ -30,12 +29,6 @@ _FIRST_WORD = "PathFileType"
 _LEADING = 2  # Frame# and Time
 SLACK = 0.01
 """DataRate and the column Time agree within such a share."""
-
-
-@dataclass(frozen=True)
-class _Header:
-    facts: dict[str, str]
-    names: tuple[str, ...]
 
 
 def read_trc(path: Path) -> Take:
@@ -47,26 +40,23 @@ def read_trc(path: Path) -> Take:
         Naming the file and the line or column that is at fault.
     """
     with reading(path):
-        lines = [
-            Row(number, [cell.strip() for cell in line.split("\t")])
-            for number, line in enumerate(read_text(path).splitlines(), start=1)
-        ]
-        header = _header(lines[:5])
-        rows = _frames(lines[5:], header)
-        columns = ["Frame#", "Time", *(f"{name}.{axis}" for name in header.names for axis in "xyz")]
+        lines = read_lines(path, "\t")
+        facts, names = _header(lines[:5])
+        rows = _frames(lines[5:], names)
+        columns = ["Frame#", "Time", *(f"{name}.{axis}" for name in names for axis in "xyz")]
         values = to_numbers(rows, columns, range(1, len(columns)))
         time, positions = values[:, 0], values[:, 1:].reshape(len(rows), -1, 3)
         _hide_zeros(positions)
         return Take(
             time=time,
-            source=Source(positions, header.names),
-            fps=_rate(header, time),
-            units=header.facts.get("units", ""),
+            source=Source(positions, names),
+            fps=_rate(facts, time),
+            units=facts.get("units", ""),
         )
 
 
-def _header(lines: Sequence[Row]) -> _Header:
-    """What the five lines before the frames say."""
+def _header(lines: Sequence[Line]) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Facts by their lower-case names, and the markers, from the five lines before the frames."""
     if len(lines) < 5 or lines[0].cells[0] != _FIRST_WORD:
         found = repr(lines[0].cells[0][:40]) if lines else "an empty file"
         raise InputError(
@@ -82,28 +72,23 @@ def _header(lines: Sequence[Row]) -> _Header:
     stated = facts.get("nummarkers", str(len(names)))
     if stated != str(len(names)):
         raise InputError(
-            "line 4", f"{stated} markers as NumMarkers says", f"{len(names)}", "Export it again."
+            "line 4", f"{stated} markers, as in NumMarkers", f"{len(names)}", "Export it again."
         )
-    return _Header(facts, names)
+    return facts, names
 
 
-def _frames(lines: Sequence[Row], header: _Header) -> list[Row]:
+def _frames(lines: Sequence[Line], names: Sequence[str]) -> list[Line]:
     """The lines that are not blank, each with a cell a column: trailing blanks may be left out."""
-    width = _LEADING + 3 * len(header.names)
-    rows = [Row(row.line, _filled(row, width)) for row in lines if any(row.cells)]
+    width = _LEADING + 3 * len(names)
+    rows = [Line(row.number, _filled(row, width)) for row in lines if any(row.cells)]
     if not rows:
         raise InputError("file", "frames after the header", "none", "Export the file again.")
     return rows
 
 
-def _filled(row: Row, width: int) -> list[str]:
+def _filled(row: Line, width: int) -> list[str]:
     if len(row.cells) < _LEADING or any(row.cells[width:]):
-        raise InputError(
-            f"line {row.line}",
-            f"{width} cells for the markers of the header",
-            f"{len(row.cells)}",
-            "Mend or remove the line.",
-        )
+        raise row.error("", f"{width} cells for the markers of the header", f"{len(row.cells)}")
     return (row.cells + [""] * width)[:width]
 
 
@@ -115,18 +100,18 @@ def _hide_zeros(positions: FloatArray) -> None:
     positions[lost] = np.nan
 
 
-def _rate(header: _Header, time: FloatArray) -> float:
-    """Frames a second as the header states it, unless the times of the frames say otherwise."""
+def _rate(facts: dict[str, str], time: FloatArray) -> float:
+    """Frames a second as the header states it, unless the times of the frames contradict it."""
     shown = nominal_rate(time)
     try:
-        stated = float(header.facts["datarate"])
+        stated = float(facts["datarate"])
     except (KeyError, ValueError):
         return shown
     if not math.isfinite(stated):
         return shown
     if not (np.diff(time) > 0).all() or _agrees(stated, shown, time):
         return stated
-    log.warning("DataRate says %g frames/s, the column Time %.4g: the column counts", stated, shown)
+    log.warning("DataRate is %g frames/s, the column Time %.4g: the column counts", stated, shown)
     return shown
 
 

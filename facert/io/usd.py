@@ -17,15 +17,11 @@ from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
 from facert.mesh.morphs import Morphs
 
-ENDINGS = (".usd", ".usda", ".usdc")
-
 _ROOT = "/face"
 _JOINT = "root"
 
 
-def write_usd(
-    morphs: Morphs, path: Path, fps: float, up_axis: str = "", overwrite: bool = False
-) -> None:
+def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
     """Write a mesh with blend shapes and the animation of their weights.
 
     Times are counted in frames from 0; a vertex that a shape does not move has no offset.
@@ -34,11 +30,7 @@ def write_usd(
     ----------
     morphs : Morphs
     path : Path
-        Its ending is one of `ENDINGS`.
-    fps : float
-        Frames a second.
-    up_axis : str
-        ``"y"`` or ``"z"``; USD's own default, y, when it is not known.
+        Its ending is .usd, .usda or .usdc.
     overwrite : bool
         Allow to replace an existing file.
 
@@ -56,14 +48,14 @@ def write_usd(
         raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))
     with replacing(path, overwrite) as temporary:
         stage = Usd.Stage.CreateNew(str(temporary))
-        UsdGeom.SetStageUpAxis(stage, "Z" if up_axis.lower() == "z" else "Y")
+        UsdGeom.SetStageUpAxis(stage, "Y")
         UsdGeom.SetStageMetersPerUnit(stage, in_metres(morphs.neutral.units) or 1.0)
-        _set_clock(stage, morphs, fps)
+        _set_clock(stage, morphs)
         root = UsdSkel.Root.Define(stage, _ROOT)
         stage.SetDefaultPrim(root.GetPrim())
         tokens = _identifiers(morphs.names)
         mesh = _mesh(stage, morphs)
-        _bind(stage, mesh, _animation(stage, morphs, tokens, fps), len(morphs.neutral.vertices))
+        _bind(stage, mesh, _animation(stage, morphs, tokens), len(morphs.neutral.vertices))
         _blend_shapes(stage, mesh, morphs, tokens)
         stage.GetRootLayer().comment = CREATED_BY
         stage.GetRootLayer().Save()
@@ -77,11 +69,11 @@ def _pxr() -> tuple[Any, Any, Any]:
     return Usd, UsdGeom, UsdSkel
 
 
-def _set_clock(stage: Any, morphs: Morphs, fps: float) -> None:
-    stage.SetTimeCodesPerSecond(fps)
-    stage.SetFramesPerSecond(fps)
+def _set_clock(stage: Any, morphs: Morphs) -> None:
+    stage.SetTimeCodesPerSecond(morphs.fps)
+    stage.SetFramesPerSecond(morphs.fps)
     stage.SetStartTimeCode(0.0)
-    stage.SetEndTimeCode(float(morphs.time[-1] - morphs.time[0]) * fps)
+    stage.SetEndTimeCode(float(morphs.time[-1] - morphs.time[0]) * morphs.fps)
 
 
 def _mesh(stage: Any, morphs: Morphs) -> Any:
@@ -102,14 +94,14 @@ def _mesh(stage: Any, morphs: Morphs) -> Any:
     return mesh
 
 
-def _animation(stage: Any, morphs: Morphs, tokens: list[str], fps: float) -> Any:
+def _animation(stage: Any, morphs: Morphs, tokens: list[str]) -> Any:
     """The weights of the shapes in every frame."""
     from pxr import UsdSkel, Vt
 
     animation = UsdSkel.Animation.Define(stage, f"{_ROOT}/animation")
     animation.CreateBlendShapesAttr(tokens)
     weights = animation.CreateBlendShapeWeightsAttr()
-    frames = (morphs.time - morphs.time[0]) * fps
+    frames = (morphs.time - morphs.time[0]) * morphs.fps
     for frame, row in zip(frames.tolist(), morphs.weights.astype(np.float32), strict=True):
         weights.Set(Vt.FloatArray.FromNumpy(row), frame)
     return animation

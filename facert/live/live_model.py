@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import facert
+from facert.data.resampling import nominal_rate
 from facert.errors import FacertError, InputError, NumericalError
-from facert.io.rate import nominal_rate
 from facert.live.frames import Frame
 from facert.live.opening import PlacementWatch, RestWatch
 from facert.preprocess.live_faults import MarkerWatch

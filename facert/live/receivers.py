@@ -14,7 +14,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
-from facert.io.livelink import TICKS, format_timecode
+from facert.data.timecode import TICKS, format_timecode
 from facert.live.frames import BadPacketError, Counters, Decoder, Frame, Observed, frame_pattern
 from facert.live.order import Order
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.resampling import nominal_rate
 from facert.data.take import Controls, Source, Take
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.io.formats import write_take_file
-from facert.io.rate import nominal_rate
 from facert.live.frames import Frame, frame_pattern
 
 if TYPE_CHECKING:

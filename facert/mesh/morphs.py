@@ -39,6 +39,8 @@ class Morphs:
         Seconds.
     error : float
         The targets miss no vertex of the original by more, in the neutral's units.
+    fps : float
+        Nominal frames a second.
     """
 
     neutral: Mesh
@@ -47,9 +49,10 @@ class Morphs:
     weights: FloatArray
     time: FloatArray
     error: float = 0.0
+    fps: float = 30.0
 
 
-def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray) -> Morphs:
+def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0) -> Morphs:
     """A rig's own shapes, without those that stay at 0.
 
     Parameters
@@ -58,6 +61,7 @@ def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray) -> Morphs:
     params : array, shape (T, P)
         Rows of NaN, frames without a pose, are left out.
     time : array, shape (T,)
+    fps : float
 
     Raises
     ------
@@ -70,7 +74,8 @@ def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray) -> Morphs:
     moving = np.flatnonzero(np.any(params[posed] != 0, axis=0))
     moving = moving if len(moving) else np.arange(1)
     names = tuple(rig.names[index] for index in moving)
-    return Morphs(rig.mesh, rig.shapes[moving], names, params[np.ix_(posed, moving)], time[posed])
+    weights = params[np.ix_(posed, moving)]
+    return Morphs(rig.mesh, rig.shapes[moving], names, weights, time[posed], fps=fps)
 
 
 def compact_morphs(sequence: MeshSequence, tolerance: float = TOLERANCE, seed: int = 0) -> Morphs:
@@ -174,7 +179,8 @@ def _scaled(sequence: MeshSequence, weights: FloatArray, basis: FloatArray, erro
     scale = np.where(scale == 0, 1.0, scale)
     targets = (basis * scale).T.reshape(-1, *sequence.neutral.vertices.shape)
     names = tuple(f"motion{index}" for index in range(1, len(targets) + 1))
-    return Morphs(sequence.neutral, targets, names, weights / scale, sequence.time, error)
+    weights = weights / scale
+    return Morphs(sequence.neutral, targets, names, weights, sequence.time, error, sequence.fps)
 
 
 def _largest(moved: FloatArray) -> float:

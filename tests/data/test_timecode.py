@@ -2,8 +2,7 @@
 
 import pytest
 
-from facert.data.timecode import timecode
-from facert.io.livelink import format_timecode, parse_timecode
+from facert.data.timecode import format_timecode, parse_timecode, timecode
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from facert.errors import InputError, OutputExistsError
 from facert.io import formats
 from facert.io.glb import write_glb
 from facert.io.poses import read_poses
+from facert.io.registry import require_output
 from facert.mesh.morphs import rig_morphs
 
 TAKE = Take(time=[0.0, 0.5], source=Source(np.array([[0.0], [1.0]]), ["jawOpen"]), fps=2.0)
@@ -59,7 +60,7 @@ def test_an_unknown_ending_is_refused_with_those_that_are_known(tmp_path, name):
     path = tmp_path / name
     with pytest.raises(InputError, match=r"\.livelink\.csv"):
         formats.write_take_file(TAKE, path)
-    with pytest.raises(InputError, match=r"\.h5 or \.hdf5"):
+    with pytest.raises(InputError, match=r"\.h5, \.hdf5"):
         formats.write_rig_file(RIG, path)
     assert not path.exists()
     with pytest.raises(InputError, match="found nothing"):
@@ -146,7 +147,7 @@ def test_a_few_poses_without_their_recording_are_told_how_to_come_back(
 def test_a_few_poses_for_live_link_are_told_to_lose_their_frames(make_take, tmp_path, caplog):
     take = replace(make_take(frames=30, posed=4), controls=Controls(ARKIT_SHAPES[:4]))
     formats.write_take_file(take, tmp_path / "a.livelink.csv")
-    assert "only a .csv, .json or .h5 tells of which frames" in caplog.text
+    assert "only a .csv, .json or .h5 keeps which frames they belong to" in caplog.text
 
 
 @pytest.mark.parametrize("posed", [0, 30])
@@ -159,10 +160,10 @@ def test_a_file_of_one_matrix_that_is_whole_needs_no_word(make_take, tmp_path, p
 def test_an_output_is_refused_before_any_work(tmp_path):
     (tmp_path / "there.h5").write_text("mine")
     with pytest.raises(OutputExistsError, match=r"there\.h5"):
-        formats.require_take_output(tmp_path / "there.h5", overwrite=False)
+        require_output(tmp_path / "there.h5", False, "take")
     with pytest.raises(InputError, match=r"\.livelink\.csv, \.csv, \.json, found '\.glb'"):
-        formats.require_take_output(tmp_path / "a.glb", overwrite=True)
-    formats.require_take_output(tmp_path / "there.h5", overwrite=True)
+        require_output(tmp_path / "a.glb", True, "take")
+    require_output(tmp_path / "there.h5", True, "take")
 
 
 @pytest.mark.parametrize("name", ["take.h5", "take.csv", "take.json"])

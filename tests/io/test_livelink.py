@@ -8,17 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.names import ARKIT_NAMES, ARKIT_SHAPES
+from facert.data.resampling import nominal_rate
 from facert.data.take import Controls, Source, Take
-from facert.data.timecode import timecode
+from facert.data.timecode import format_timecode, parse_timecode, timecode
 from facert.errors import InputError
 from facert.io.formats import read_take_file
-from facert.io.livelink import (
-    format_timecode,
-    parse_timecode,
-    read_livelink,
-    write_livelink,
-)
-from facert.io.rate import nominal_rate
+from facert.io.livelink import read_livelink, write_livelink
 
 DAY = 24 * 3600 * 60_000
 

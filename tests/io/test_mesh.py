@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from facert.data.rig import Mesh, Rig
 from facert.errors import InputError
-from facert.io.mesh import read_mesh
+from facert.io.formats import read_mesh
 from facert.io.ply import read_ply
 from facert.io.rig import write_rig
 

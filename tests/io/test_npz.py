@@ -62,7 +62,7 @@ def test_one_of_several_sets_of_shapes_is_chosen(path):
     assert read_npz_rig(path, shapes="b").names == ("y", "z")
     with pytest.raises(InputError, match="one of: a, b"):
         read_npz_rig(path)
-    assert npz.holds_rig(path)
+    assert npz.kind_of(path) == "rig"
 
 
 @pytest.mark.parametrize(

@@ -15,15 +15,15 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 def test_polygons_become_triangle_fans_in_every_form_of_a_corner(tmp_path, face):
     path = tmp_path / "mesh.obj"
     path.write_text(f"# comment\no face\n{SQUARE}vt 0 0\nvn 0 0 1\n\n{face}\n")
-    vertices, faces = read_obj(path)
-    assert faces.tolist() == [[0, 1, 2], [0, 2, 3]]
-    np.testing.assert_array_equal(vertices[2], [1, 1, 0])
+    mesh = read_obj(path)
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    np.testing.assert_array_equal(mesh.vertices[2], [1, 1, 0])
 
 
 def test_negative_corners_count_from_the_vertices_so_far(tmp_path):
     path = tmp_path / "mesh.obj"
     path.write_text("v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 5 5\n")
-    assert read_obj(path)[1].tolist() == [[0, 1, 2]]
+    assert read_obj(path).faces.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(

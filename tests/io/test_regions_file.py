@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from facert import InputError
 from facert.data.regions import Region, Regions
-from facert.io.regions import WIDTH, read_regions, regions_text
+from facert.io.toml import WIDTH, read_regions, regions_text
 
 NAMES = st.lists(
     st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=30),

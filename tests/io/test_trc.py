@@ -43,7 +43,7 @@ def test_positions_times_names_rate_and_unit_are_read(path: Path) -> None:
 def test_the_column_time_counts_where_the_header_states_another_rate(path: Path, caplog) -> None:
     path.write_text((HEADER + ROWS).replace("120\t120\t3", "60\t120\t3"))
     assert read_trc(path).fps == pytest.approx(120)
-    assert "DataRate says 60 frames/s, the column Time 120" in caplog.text
+    assert "DataRate is 60 frames/s, the column Time 120" in caplog.text
 
 
 @pytest.mark.parametrize("stated", ["120", "119.88", "", "?"])
@@ -84,7 +84,7 @@ def test_blank_zero_and_missing_cells_were_not_observed(path: Path, line: str, l
     [
         ("PathFileType", "Path", "line 1: expected PathFileType"),
         ("Frame#\tTime", "Frame\tSeconds", "line 4"),
-        ("\t3\t2\tmm", "\t3\t5\tmm", "expected 5 markers as NumMarkers says, found 2"),
+        ("\t3\t2\tmm", "\t3\t5\tmm", "expected 5 markers, as in NumMarkers, found 2"),
         ("chin", "brow", "'brow' twice"),
         ("\t1.5\t", "\tone\t", "line 8, column brow.x: expected a number"),
         ("\t6.25\n", "\t6.25\t7\n", "line 8: expected 8 cells"),

@@ -12,6 +12,7 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan, require_kept
 from facert.cli.shared.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
+from facert.io.registry import listed
 
 if TYPE_CHECKING:
     from facert.cli.shared.conversion import Wanted
@@ -30,11 +31,10 @@ def command(
         list[Path],
         typer.Argument(
             metavar="IN OUT",
-            help="IN: a take (.h5, .csv of Live Link Face or plain, .json of Audio2Face, .txt of"
-            " Face Cap, .c3d, .trc, .npz), a rig (.h5, .glb, .gltf, .npz, folder of .obj) or a mesh"
-            " sequence. OUT, whose ending tells the format: .h5, .livelink.csv, .csv, .json; .glb"
-            " or .usd for a rig, and with --rig for a take. With --out-dir: any number of files,"
-            " or folders of takes.",
+            help=f"IN: a take ({listed('read', 'take')}), a rig ({listed('read', 'rig')}, folder of"
+            f" .obj) or a mesh sequence. OUT, by whose ending the format is chosen:"
+            f" {listed('write', 'take')}; {listed('write', 'morphs')} for a rig, and with --rig for"
+            " a take. With --out-dir: any number of files, or folders of takes.",
         ),
     ],
     kind: Annotated[
@@ -83,12 +83,12 @@ def command(
     shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
     does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
     """
-    from facert.cli.shared.conversion import ENDINGS, Wanted
+    from facert.cli.shared.conversion import KINDS, Wanted
     from facert.data.conversion import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
 
-    todo = plan(paths, out_dir, ending, jobs, overwrite, ENDINGS)
+    todo = plan(paths, out_dir, ending, jobs, overwrite, KINDS)
     require_kept(todo, map_path, poses_path, rig_path)
     changes = Changes(
         names=read_toml(map_path) if map_path else {},

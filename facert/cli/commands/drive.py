@@ -11,13 +11,14 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.options import OVERWRITE, SHAPES
 from facert.data.text import plural
+from facert.io.registry import endings
 
 if TYPE_CHECKING:
     from facert.data.rig import Mesh, MeshSequence
     from facert.data.take import Take
     from facert.errors import InputError
 
-ENDINGS = (".h5", ".hdf5", ".glb")
+ENDINGS = (*endings("write", "mesh sequence"), ".glb")
 
 
 class Fit(StrEnum):
@@ -85,8 +86,7 @@ def command(
     """
     from facert.data.rig import MeshSequence
     from facert.errors import InputError, reading
-    from facert.io.formats import read_source_file
-    from facert.io.mesh import read_mesh
+    from facert.io.formats import read_mesh, read_source_file
     from facert.io.toml import read_toml
     from facert.topology.driving import FaceDriver, LooseParts
     from facert.topology.feature_points import Where, feature_points

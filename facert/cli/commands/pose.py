@@ -96,10 +96,10 @@ def command(
     model = model or DEFAULT_MODEL
     given = _parse(wanted)
     import facert
-    from facert.io.formats import require_take_output
+    from facert.io.registry import require_output
 
     if output is not None:
-        require_take_output(output, overwrite)
+        require_output(output, overwrite, "take")
 
     retargeter = facert.load(model) if start or poses is None else None
     begun = _retargeted(start, retargeter, target) if retargeter and start else None

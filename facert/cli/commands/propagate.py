@@ -72,15 +72,11 @@ def command(
     import numpy as np
 
     from facert.errors import reading
-    from facert.io.formats import (
-        read_source_file,
-        read_take_file,
-        require_take_output,
-        write_take_file,
-    )
+    from facert.io.formats import read_source_file, read_take_file, write_take_file
+    from facert.io.registry import require_output
     from facert.topology.takes import Propagation, propagate_poses, propagate_positions
 
-    require_take_output(output, overwrite)
+    require_output(output, overwrite, "take")
     how = Propagation(method, window, dim, limits.value)
     if positions is None:
         take = read_take_file(source, target)

@@ -21,7 +21,7 @@ def command(
     `facert train --regions regions.toml`. A control may be in several regions.
     """
     from facert.io.formats import read_take_file
-    from facert.io.regions import regions_text
+    from facert.io.toml import regions_text
     from facert.preprocess.preparation import prepare
     from facert.regions.automatic import find_regions
     from facert.settings import Settings

@@ -42,12 +42,13 @@ def command(
     The weights that drive the rig are the target of the take: its truth.
     """
     from facert.errors import reading
-    from facert.io import formats
+    from facert.io.formats import read_rig_file, read_source_file, write_take_file
+    from facert.io.registry import require_output
     from facert.mesh.capture import simulate_capture
 
-    formats.require_take_output(output, overwrite)
+    require_output(output, overwrite, "take")
     chosen = None if vertices is None else _indices(vertices)
-    actor, performance = formats.read_rig_file(rig, shapes), formats.read_source_file(weights)
+    actor, performance = read_rig_file(rig, shapes), read_source_file(weights)
     with reading(weights):
         take = simulate_capture(
             actor,
@@ -58,7 +59,7 @@ def command(
             missing=missing,
             seed=seed,
         )
-    formats.write_take_file(take, output, overwrite)
+    write_take_file(take, output, overwrite)
     controls = 0 if take.controls is None else len(take.controls.names)
     markers_of = f"{plural(len(take), 'frame')} of {plural(len(take.source.names), 'marker')}"
     console.out.print(f"{output}: {markers_of}, {plural(controls, 'control')}", markup=False)

@@ -53,10 +53,11 @@ def command(
     as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
     """
     from facert.cli.shared.cleaned_take import read_observed, write_beside
-    from facert.io.formats import read_source_file, require_take_output, targets_for
+    from facert.io.formats import read_source_file, targets_for
+    from facert.io.registry import require_output
     from facert.preprocess.head_motion import stabilise
 
-    require_take_output(output, overwrite)
+    require_output(output, overwrite, "take")
     require_other_file(source, output, "IN")
     if like is not None and reference != "mean":
         raise typer.BadParameter("--like and --reference both tell the head pose: give one")

@@ -189,7 +189,7 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
 def _regions(given: str | None) -> Regions | str | None:
     """Of the option: the word auto, or what is in a file."""
     from facert.data.regions import AUTO
-    from facert.io.regions import read_regions
+    from facert.io.toml import read_regions
 
     return given if given in (AUTO, None) else read_regions(Path(given))
 

@@ -13,6 +13,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.errors import FacertError, InputError, OutputExistsError
+from facert.io.registry import Kind, format_of, output_format
 
 Work = Callable[[Path, Path], None]
 """Makes one file from another; must be picklable where there are several jobs."""
@@ -42,7 +43,7 @@ def plan(
     ending: str | None,
     jobs: int | None,
     overwrite: bool,
-    endings: tuple[str, ...] = (),
+    kinds: tuple[Kind, ...] = ("take",),
 ) -> Plan:
     """What to do.
 
@@ -57,8 +58,8 @@ def plan(
     jobs : int, optional
         Files at a time in `out_dir`; by default one, 0 as many as there are processor cores.
     overwrite : bool
-    endings : tuple of str
-        What results may end in; by default what takes can be written to.
+    kinds : tuple of str
+        What results may be: their endings are those of a format for one of them.
 
     Raises
     ------
@@ -69,12 +70,12 @@ def plan(
         For a single OUT that exists.
     """
     if out_dir is None:
-        return _single(paths, ending, jobs, overwrite, endings)
+        return _single(paths, ending, jobs, overwrite, kinds)
     if ending is not None and not ending.startswith("."):
         raise typer.BadParameter(f"write --ending with its dot: .{ending}")
     sources = [file for path in paths for file in _files(path)]
     outputs = [out_dir / (_stem(source) + (ending or ".h5")) for source in sources]
-    _require_ending(outputs[0], endings)
+    output_format(outputs[0], *kinds)
     twice = [name for name in outputs if outputs.count(name) > 1]
     if twice:
         raise InputError(
@@ -109,7 +110,7 @@ def _single(
     ending: str | None,
     jobs: int | None,
     overwrite: bool,
-    endings: tuple[str, ...],
+    kinds: tuple[Kind, ...],
 ) -> Plan:
     """One file, IN to OUT."""
     if len(paths) != 2:
@@ -117,7 +118,7 @@ def _single(
     for option, given in (("--ending", ending), ("--jobs", jobs)):
         if given is not None:
             raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
-    _require_ending(paths[1], endings)
+    output_format(paths[1], *kinds)
     if paths[1].exists():
         require_other_file(paths[0], paths[1], "IN")
         if not overwrite:
@@ -143,15 +144,6 @@ def _identity(path: Path) -> tuple[int, int]:
     """The same for every name of a file: other spellings, symbolic and hard links."""
     found = path.stat()
     return found.st_dev, found.st_ino
-
-
-def _require_ending(output: Path, endings: tuple[str, ...]) -> None:
-    """Refuse a result that cannot be written, before any work is done."""
-    from facert.io.formats import TAKE_OUTPUTS, ends_in, unknown_output
-
-    known = endings or TAKE_OUTPUTS
-    if not ends_in(output, known):
-        raise unknown_output(output, ", ".join(known))
 
 
 def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
@@ -220,11 +212,8 @@ def _files(path: Path) -> list[Path]:
     """A file, or the takes in a folder."""
     if not path.is_dir():
         return [path]
-    from facert.io.formats import TAKE_ENDINGS
-
-    found = sorted(
-        file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TAKE_ENDINGS
-    )
+    files = (file for file in path.iterdir() if file.is_file())
+    found = sorted(file for file in files if format_of(file, "read", "take"))
     if not found:
         raise InputError("the folder", "takes", "none", "Give a folder with takes.", str(path))
     return found

@@ -29,10 +29,11 @@ def write_beside(
     take: Take, output: Path, overwrite: bool, beside: Mapping[str, NDArray[Any]]
 ) -> None:
     """Write a take, and beside it what only HDF5 can hold."""
-    from facert.io.formats import HDF5_ENDINGS, write_take_file
+    from facert.io.formats import write_take_file
+    from facert.io.registry import OWN_ENDINGS
     from facert.io.take import write_take
 
-    if output.suffix.lower() in HDF5_ENDINGS:
+    if output.suffix.lower() in OWN_ENDINGS:
         write_take(take, output, overwrite, beside)
         return
     write_take_file(take, output, overwrite)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,41 +14,28 @@ from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.data.units import in_metres
-from facert.errors import InputError, OutputExistsError, reading
-from facert.io import formats, usd
-from facert.io.glb import write_glb
+from facert.errors import InputError, reading
+from facert.io import formats
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
+from facert.io.registry import OWN_ENDINGS, Kind, output_format, require_output, write
 from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
 from facert.render.faces import control_settings
 
-if TYPE_CHECKING:
-    from facert.io.formats import Kind
-
 log = logging.getLogger("facert")
 
-MORPH_ENDINGS = (".glb", *usd.ENDINGS)
-ENDINGS = (*formats.HDF5_ENDINGS, ".livelink.csv", ".csv", ".json", *MORPH_ENDINGS)
-_OF_A_RIG = (*formats.HDF5_ENDINGS, *MORPH_ENDINGS)
+KINDS: tuple[Kind, ...] = ("take", "rig", "morphs")
+"""What a file can be converted to."""
 
 
 @dataclass(frozen=True)
 class Wanted:
     """What to read of the input: see `facert.io.formats.read_any`; and the rig of a take."""
 
-    kind: Kind | None = None
+    kind: formats.TakeOrRig | None = None
     target: str | None = None
     shapes: str | None = None
     fps: float | None = None
     rig: Path | None = None
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """Morph targets, and what they are timed and placed by."""
-
-    morphs: Morphs
-    fps: float = 30.0
-    up_axis: str = ""
 
 
 def convert_file(
@@ -64,10 +50,7 @@ def convert_file(
     OutputExistsError
         When `output` exists and `overwrite` is not set.
     """
-    if not output.name.lower().endswith(ENDINGS):
-        raise formats.unknown_output(output, ", ".join(ENDINGS))
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
+    of_morphs = "morphs" in require_output(output, overwrite, *KINDS).write
     if holds_mesh_sequence(source):
         return _convert_sequence(source, output, changes, overwrite)
     found = _read(source, output, wanted, changes)
@@ -75,7 +58,7 @@ def convert_file(
         found = converted(found, changes)
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
-        if output.suffix.lower() in MORPH_ENDINGS:
+        if of_morphs:
             return _write_motion(_motion(found, wanted, changes), output, overwrite)
     formats.write_take_file(found, output, overwrite)
     return _content(found, output)
@@ -86,7 +69,7 @@ def _content(take: Take, output: Path) -> str:
     frames = plural(len(take), "frame")
     source = plural(len(take.source.names), take.source.kind[:-1])
     poses = plural(len(take.labels), "pose")
-    if output.suffix.lower() in formats.HDF5_ENDINGS:
+    if output.suffix.lower() in OWN_ENDINGS:
         return f"a take with {frames} of {source} and {poses}"
     if take.controls is None or take.params is None:
         return f"{frames} of {source}"
@@ -96,7 +79,7 @@ def _content(take: Take, output: Path) -> str:
 def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take | Rig:
     """The take or the rig of a file; of one with both, the take where only that makes sense."""
     kind = wanted.kind
-    no_rig = output.suffix.lower() not in _OF_A_RIG
+    no_rig = not output_format(output, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or changes.of_frames or no_rig):
         kind = "take"
     return formats.read_any(source, wanted.target, wanted.shapes, wanted.fps, kind)
@@ -107,14 +90,13 @@ def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: b
         raise InputError(
             "options", "none that change a take", "a mesh sequence", "Leave them out.", str(source)
         )
-    if output.suffix.lower() not in MORPH_ENDINGS:
-        raise formats.unknown_output(output, ", ".join(MORPH_ENDINGS))
+    output_format(output, "morphs")
     with open_mesh_sequence(source) as sequence:
-        motion = _Motion(compact_morphs(sequence), sequence.fps)
-    return _write_motion(motion, output, overwrite)
+        morphs = compact_morphs(sequence)
+    return _write_motion(morphs, output, overwrite)
 
 
-def _motion(take: Take, wanted: Wanted, changes: Changes) -> _Motion:
+def _motion(take: Take, wanted: Wanted, changes: Changes) -> Morphs:
     """The rig in the poses of a take, or as its tracked weights move it."""
     if wanted.rig is None:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
@@ -128,29 +110,25 @@ def _motion(take: Take, wanted: Wanted, changes: Changes) -> _Motion:
     if not len(take.labels) and take.source.kind == "weights":
         take = weights_as_poses(take, in_unit)
     settings = control_settings(take, in_unit, range(len(take)))
-    return _Motion(rig_morphs(in_unit, settings, take.time), take.fps)
+    return rig_morphs(in_unit, settings, take.time, take.fps)
 
 
 def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:
-    if output.suffix.lower() in MORPH_ENDINGS:
+    if "morphs" in output_format(output, "rig", "morphs").write:
         rest = np.zeros((1, len(rig.names)))
         still = Morphs(rig.mesh, rig.shapes, rig.names, rest, np.zeros(1))
-        _write_motion(_Motion(still), output, overwrite)
+        _write_motion(still, output, overwrite)
     else:
         formats.write_rig_file(rig, output, overwrite)
     vertices = plural(len(rig.neutral), "vertex", "vertices")
     return f"a rig with {vertices} and {plural(len(rig.names), 'shape')}"
 
 
-def _write_motion(motion: _Motion, output: Path, overwrite: bool) -> str:
-    morphs = motion.morphs
+def _write_motion(morphs: Morphs, output: Path, overwrite: bool) -> str:
     if in_metres(morphs.neutral.units) is None:
         told = "the mesh has no unit that is known: its numbers are written as metres; where they"
         log.warning("%s are not, say so: --in-units cm", told)
-    if output.suffix.lower() == ".glb":
-        write_glb(morphs, output, overwrite)
-    else:
-        usd.write_usd(morphs, output, motion.fps, motion.up_axis, overwrite)
+    write("morphs", morphs, output, overwrite)
     error = f", off by {morphs.error:.2g} at most" if morphs.error else ""
     targets = plural(len(morphs.targets), "morph target")
     return f"{plural(len(morphs.time), 'frame')} of {targets}{error}"

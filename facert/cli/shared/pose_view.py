@@ -74,10 +74,10 @@ def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> Posi
 
 def _require_output(output: Path, overwrite: bool) -> None:
     """Refuse names that could not be written to once an hour of posing is done."""
-    from facert.io.formats import HDF5_ENDINGS
+    from facert.io.registry import OWN_ENDINGS
 
-    if output.suffix.lower() not in HDF5_ENDINGS:
-        expected, found = f"a name that ends in {HDF5_ENDINGS[0]}", repr(output.suffix)
+    if output.suffix.lower() not in OWN_ENDINGS:
+        expected, found = f"a name that ends in {OWN_ENDINGS[0]}", repr(output.suffix)
         raise InputError("output", expected, found, "Give another name.", where=str(output))
     for path in (output, output.with_suffix(".safetensors")):
         if path.exists() and not overwrite:

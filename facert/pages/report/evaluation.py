@@ -16,7 +16,7 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.figures import INK, plot_errors
 from facert.evaluation.summary import Row, best
-from facert.io.text import existing_file, read_text
+from facert.io.guarded import existing_file, read_text
 from facert.pages.report.pictures import embedded
 from facert.pages.report.sections import Fact, Picture, Section, Table
 

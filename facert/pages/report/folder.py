@@ -16,11 +16,10 @@ from facert.data.take import Controls, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io.curves import read_json_object
-from facert.io.formats import HDF5_ENDINGS, read_take_file
-from facert.io.hdf5 import stated_format
-from facert.io.rig import FORMAT as RIG_FORMAT
+from facert.io.formats import read_take_file
+from facert.io.hdf5 import RIG_FORMAT, TAKE_FORMAT, stated_format
+from facert.io.registry import OWN_ENDINGS
 from facert.io.rig import read_rig
-from facert.io.take import FORMAT as TAKE_FORMAT
 from facert.pages.report.evaluation import read_evaluation
 from facert.pages.report.performance import fits, performance_section, truth_among
 from facert.pages.report.sections import Fact, Section
@@ -87,7 +86,7 @@ def read_performance(path: Path) -> Take:
         When the file cannot be read.
     """
     take = read_take_file(path)
-    if path.suffix.lower() in HDF5_ENDINGS or take.source.kind != "weights":
+    if path.suffix.lower() in OWN_ENDINGS or take.source.kind != "weights":
         return take
     values = take.source.values
     whole = ~np.isnan(values).any(axis=1, keepdims=True)
@@ -114,7 +113,7 @@ def _performances(
 
 def _is_result(path: Path, take: Take) -> bool:
     """Whether a method wrote the poses; only HDF5 files hold a truth."""
-    return take.std is not None or path.suffix.lower() not in HDF5_ENDINGS
+    return take.std is not None or path.suffix.lower() not in OWN_ENDINGS
 
 
 def _model(path: Path) -> Section:
@@ -149,7 +148,7 @@ def _takes(folder: Path, curves: list[Path]) -> Iterator[tuple[Path, Take]]:
     """Takes, and what columns tell that no take of the same name does."""
     for path in _of_format(folder, TAKE_FORMAT):
         yield from ((path, take) for take in _read([path], read_performance))
-    stems = {path.stem for path in _files(folder, *HDF5_ENDINGS)}
+    stems = {path.stem for path in _files(folder, *OWN_ENDINGS)}
     for path in [*curves, *_files(folder, ".csv")]:
         if path.stem.removesuffix(".livelink") not in stems:
             yield from ((path, take) for take in _read([path], read_performance))
@@ -157,7 +156,7 @@ def _takes(folder: Path, curves: list[Path]) -> Iterator[tuple[Path, Take]]:
 
 def _of_format(folder: Path, form: str) -> list[Path]:
     """HDF5 files of a folder that say that they are of a format."""
-    return [path for path in _files(folder, *HDF5_ENDINGS) if _stated(path) == form]
+    return [path for path in _files(folder, *OWN_ENDINGS) if _stated(path) == form]
 
 
 def _files(folder: Path, *endings: str) -> list[Path]:

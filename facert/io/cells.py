@@ -1,9 +1,8 @@
-"""The guarded door for text: existing, not too large, UTF-8; and numbers out of rows of cells."""
+"""Cells of text files: lines that are cut into cells, checked widths, numbers out of rows."""
 
 from __future__ import annotations
 
 import csv
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +12,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
+from facert.io.guarded import existing_file, read_text
 
-MAX_BYTES = 2**29
-"""Largest text file that is read: half a gibibyte."""
 MAX_HEADER = 2**20
 SEPARATORS = ",;\t"
 
@@ -24,54 +22,40 @@ _COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 
 
 @dataclass(frozen=True)
-class Row:
-    """The cells of one line of a CSV file, and that line's number (from 1)."""
+class Line:
+    """The cells of one line, and its number (from 1)."""
 
-    line: int
+    number: int
     cells: list[str]
 
-
-def existing_file(path: Path) -> Path:
-    """Check that `path` is a file that may be read.
-
-    Raises
-    ------
-    InputError
-        When there is nothing, a folder, or a file without permission.
-    """
-    if not (path.is_file() and os.access(path, os.R_OK)):
-        found = "a folder" if path.is_dir() else "no permission" if path.exists() else "nothing"
-        raise InputError("file", "an existing file", found, "Check the name.", where=str(path))
-    return path
+    def error(self, column: str, expected: str, found: str) -> InputError:
+        """The error for a cell of a column; for the whole line without one."""
+        where = f"line {self.number}" + (f", column {column}" if column else "")
+        return InputError(where, expected, found, "Mend or remove the line.")
 
 
-def read_text(path: Path) -> str:
-    """Read a UTF-8 text file, with or without a byte order mark.
+def read_lines(path: Path, separator: str) -> list[Line]:
+    """All lines of a text file, their cells stripped of blanks.
 
     Raises
     ------
     InputError
-        When the file is missing, too large or not UTF-8.
+        When the file cannot be read.
     """
-    size = existing_file(path).stat().st_size
-    if size > MAX_BYTES:
-        raise InputError("file", f"at most {MAX_BYTES} bytes", f"{size}", "Cut it into parts.")
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (UnicodeDecodeError, OSError) as error:
-        raise InputError(
-            "file", "UTF-8 text that can be read", "something else", "Save it as UTF-8."
-        ) from error
+    return [
+        Line(number, [cell.strip() for cell in line.split(separator)])
+        for number, line in enumerate(read_text(path).splitlines(), start=1)
+    ]
 
 
 def read_header(path: Path) -> tuple[str, ...]:
-    """The cells of the first line, to tell one kind of CSV file from another."""
+    """The cells of the first line, which shows the kind of a CSV file."""
     with existing_file(path).open(encoding="utf-8-sig", errors="replace") as file:
         line = file.readline(MAX_HEADER)
     return tuple(cell.strip() for cell in line.split(_separator(line)))
 
 
-def read_csv(path: Path) -> tuple[tuple[str, ...], list[Row]]:
+def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
     """Read a CSV file with a header; blank lines are skipped.
 
     Where the header is separated by semicolons or tabs, as Excel does in much of Europe, so are
@@ -80,7 +64,7 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Row]]:
     Returns
     -------
     header : tuple of str
-    rows : list of Row
+    rows : list of Line
 
     Raises
     ------
@@ -91,7 +75,7 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Row]]:
     separator = _separator(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
-        rows = [Row(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+        rows = [Line(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         line = f"line {reader.line_num}"
         raise InputError(line, "separated cells", str(error), "Export it again.") from error
@@ -106,15 +90,15 @@ def _separator(header: str) -> str:
     return max(SEPARATORS, key=header.count)
 
 
-def _with_points(rows: list[Row]) -> list[Row]:
+def _with_points(rows: list[Line]) -> list[Line]:
     """Decimal points for decimal commas, unless both occur: then a comma may part thousands."""
     cells = [cell.strip() for row in rows for cell in row.cells]
     if any(map(_POINT.fullmatch, cells)):
         return rows
-    return [Row(row.line, [_COMMA.sub(r"\1.\2", cell) for cell in row.cells]) for row in rows]
+    return [Line(row.number, [_COMMA.sub(r"\1.\2", cell) for cell in row.cells]) for row in rows]
 
 
-def check_width(rows: Sequence[Row], header: Sequence[str]) -> None:
+def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
     """Check that each row has one cell a column.
 
     Raises
@@ -124,15 +108,10 @@ def check_width(rows: Sequence[Row], header: Sequence[str]) -> None:
     """
     for row in rows:
         if len(row.cells) != len(header):
-            raise InputError(
-                f"line {row.line}",
-                f"{len(header)} cells as in the header",
-                f"{len(row.cells)}",
-                "Mend or remove the line.",
-            )
+            raise row.error("", f"{len(header)} cells as in the header", f"{len(row.cells)}")
 
 
-def to_numbers(rows: Sequence[Row], header: Sequence[str], columns: Sequence[int]) -> FloatArray:
+def to_numbers(rows: Sequence[Line], header: Sequence[str], columns: Sequence[int]) -> FloatArray:
     """Turn the cells of some columns into numbers, (rows, columns); a blank cell is NaN.
 
     Raises
@@ -148,7 +127,7 @@ def to_numbers(rows: Sequence[Row], header: Sequence[str], columns: Sequence[int
 
 
 def _first_bad_cell(
-    rows: Sequence[Row], header: Sequence[str], columns: Sequence[int]
+    rows: Sequence[Line], header: Sequence[str], columns: Sequence[int]
 ) -> InputError:
     for row in rows:
         for column in columns:
@@ -156,6 +135,5 @@ def _first_bad_cell(
             try:
                 float(cell or "nan")
             except ValueError:
-                where = f"line {row.line}, column {header[column]}"
-                return InputError(where, "a number", repr(cell[:40]), "Mend or remove the line.")
+                return row.error(header[column], "a number", repr(cell[:40]))
     raise AssertionError("every cell is a number")  # pragma: no cover

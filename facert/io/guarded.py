@@ -1,0 +1,77 @@
+"""The guarded door for foreign files: existing, not too large; damage is the file's fault."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from facert.errors import InputError
+
+MAX_BYTES = 2**29
+"""Largest file that is read as a whole: half a gibibyte."""
+
+
+def existing_file(path: Path) -> Path:
+    """Check that `path` is a file that may be read.
+
+    Raises
+    ------
+    InputError
+        When there is nothing, a folder, or a file without permission.
+    """
+    if not (path.is_file() and os.access(path, os.R_OK)):
+        found = "a folder" if path.is_dir() else "no permission" if path.exists() else "nothing"
+        raise InputError("file", "an existing file", found, "Check the name.", where=str(path))
+    return path
+
+
+def moderate_file(path: Path, most: int = MAX_BYTES) -> Path:
+    """Check that `path` is a file that may be read, and holds no more than `most` bytes.
+
+    Raises
+    ------
+    InputError
+        Also when it is larger.
+    """
+    size = existing_file(path).stat().st_size
+    if size > most:
+        raise InputError("file", f"at most {most} bytes", f"{size}", "Cut it into parts.")
+    return path
+
+
+def read_text(path: Path) -> str:
+    """Read a UTF-8 text file, with or without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, too large or not UTF-8.
+    """
+    try:
+        return moderate_file(path).read_text(encoding="utf-8-sig")
+    except (UnicodeDecodeError, OSError) as error:
+        found, fix = "something else", "Save it as UTF-8."
+        raise InputError("file", "UTF-8 text that can be read", found, fix) from error
+
+
+@contextmanager
+def parsing(
+    field: str, expected: str, fix: str = "Export it again.", found: str = "damaged data"
+) -> Iterator[None]:
+    """Blame a file for whatever goes wrong in the block, where its bytes are given a meaning.
+
+    Hostile bytes raise struct.error, KeyError, OverflowError and more, which nobody can list.
+
+    Raises
+    ------
+    InputError
+        Instead of any other exception.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(field, expected, f"{found} ({error})", fix) from error

@@ -1,0 +1,246 @@
+"""The registry of file formats: a declaration each, which names the functions of the format's file.
+
+It is free of NumPy, so that `--help` can list the formats; a format's file is imported with the
+first path of its kind. Whatever lists endings (messages, help, the table in the docs) asks here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from facert.errors import InputError, OutputExistsError
+
+Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
+Use = Literal["read", "write"]
+
+FOLDER = "/"
+"""The ending of a folder."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format of files; functions are named as ``"module.function"`` in `facert.io`.
+
+    Parameters
+    ----------
+    endings : tuple of str
+        In lower case; the last parts of a name.
+    read : mapping
+        The reader of each kind of thing that such a file can hold. It takes the path, and those of
+        ``target``, ``shapes`` and ``fps`` that it has parameters for.
+    write : mapping
+        The writer of each kind: it takes the thing, the path, and whether to overwrite.
+    kind_of : str
+        From the path, and the kind that was asked for or None, to what that very file holds.
+    targets : str
+        From the path to the targets of a take in it, and the controls of each.
+    about : str
+        What writes such takes, for ``--help``.
+    reads, writes : str
+        The cells of the table in the docs.
+    """
+
+    endings: tuple[str, ...]
+    read: Mapping[Kind, str] = field(default_factory=dict)
+    write: Mapping[Kind, str] = field(default_factory=dict)
+    kind_of: str = ""
+    targets: str = ""
+    about: str = ""
+    reads: str = ""
+    writes: str = ""
+
+    def functions(self, use: Use) -> Mapping[Kind, str]:
+        """The names of its readers, or of its writers."""
+        return self.read if use == "read" else self.write
+
+
+FORMATS = (
+    Format(
+        (".h5", ".hdf5"),
+        read={"take": "take.read_take", "rig": "rig.read_rig"},
+        write={
+            "take": "take.write_take",
+            "rig": "rig.write_rig",
+            "mesh sequence": "mesh_sequence.write_mesh_sequence",
+        },
+        kind_of="hdf5.kind_of",
+        reads="take, rig or mesh sequence",
+        writes="take, rig or mesh sequence",
+    ),
+    Format(
+        (".livelink.csv",),
+        write={"take": "livelink.write_livelink"},
+        reads="Live Link Face",
+        writes="poses (else source weights), if they are ARKit's",
+    ),
+    Format(
+        (".csv",),
+        read={"take": "table.read_csv_take"},
+        write={"take": "table.write_table"},
+        about=" of Live Link Face or plain",
+        reads="Live Link Face, or a table with a header: `time` or `frame`, `NAME.x NAME.y NAME.z` "
+        "or weights; separated by commas, or by semicolons or tabs with decimal commas as well",
+        writes="poses (else the source) as a table; never both",
+    ),
+    Format(
+        (".json",),
+        read={"take": "curves.read_curves"},
+        write={"take": "curves.write_curves"},
+        about=" of Audio2Face",
+        reads="Audio2Face curves",
+        writes="poses (else source weights)",
+    ),
+    Format((".txt",), {"take": "facecap.read_facecap"}, about=" of Face Cap", reads="Face Cap"),
+    Format((".c3d",), {"take": "c3d.read_c3d"}, reads="markers"),
+    Format(
+        (".trc",),
+        {"take": "trc.read_trc"},
+        reads="markers; where DataRate contradicts the column Time, the latter counts",
+    ),
+    Format(
+        (".glb", ".gltf"),
+        read={
+            "take": "gltf_take.read_gltf_take",
+            "rig": "gltf_rig.read_gltf_rig",
+            "mesh": "gltf_rig.read_gltf_mesh",
+        },
+        kind_of="gltf_take.kind_of",
+        reads="a rig of morph targets; their animation as a take",
+    ),
+    Format(
+        (".glb",),
+        write={"morphs": "glb.write_glb"},
+        writes="by `convert`: a rig, a take with `--rig`, a mesh sequence",
+    ),
+    Format(
+        (".usd", ".usda", ".usdc"),
+        write={"morphs": "usd.write_usd"},
+        writes="the same (`pip install 'facert[usd]'`)",
+    ),
+    Format(
+        (".npz",),
+        read={"take": "npz.read_npz_take", "rig": "npz.read_npz_rig"},
+        kind_of="npz.kind_of",
+        targets="npz.targets_of",
+        reads="tracks: `markers`, `marker_names`, `time`, `fps`, any targets `KEY` with "
+        "`KEY_names` (choose with `--target KEY`); rigs: `neutral`, `faces`, `deltas`, `names`, "
+        "or several `KEY_deltas`, `KEY_names` (choose with `--shapes KEY`)",
+    ),
+    Format((".obj",), {"mesh": "obj.read_obj"}, reads="a mesh at rest, for `drive`"),
+    Format((".ply",), {"mesh": "ply.read_ply"}, reads="a mesh at rest, for `drive`"),
+    Format(
+        (FOLDER,),
+        {"rig": "obj.read_obj_folder"},
+        reads="`neutral.obj` and one OBJ a shape: a rig",
+    ),
+)
+
+OWN_ENDINGS = FORMATS[0].endings
+"""Of facert's own files, which keep all that a take has."""
+
+_ADVICE = {
+    ".fbx": "Export it as .glb from Blender, Maya or Unreal.",
+    ".bvh": "Export it as .c3d or .trc.",
+    ".mp4": "Track the face first, e.g. with Live Link Face or Face Cap.",
+    ".mov": "Track the face first, e.g. with Live Link Face or Face Cap.",
+    ".obj": "Give the folder with neutral.obj and one OBJ file a shape.",
+    ".safetensors": "This is a model: give it with --model.",
+    **dict.fromkeys((".usd", ".usda", ".usdc"), "facert only writes USD: export a .glb."),
+}
+
+
+def endings(use: Use, *kinds: Kind) -> tuple[str, ...]:
+    """The endings of files from which one of these kinds is read, or to which it is written."""
+    found = (one.endings for one in FORMATS if one.functions(use).keys() & set(kinds))
+    return tuple(dict.fromkeys(ending for some in found for ending in some if ending != FOLDER))
+
+
+def format_of(path: Path, use: Use, *kinds: Kind) -> Format | None:
+    """The format that the name's ending stands for, of those with one of these kinds."""
+    name = FOLDER if path.is_dir() else path.name.lower() if path.suffix else ""
+    able = (one for one in FORMATS if one.functions(use).keys() & set(kinds))
+    return next((one for one in able if name.endswith(one.endings)), None)
+
+
+def function(name: str) -> Callable[..., Any]:
+    """The function of that name, see `Format`."""
+    module, _, attribute = name.partition(".")
+    found: Callable[..., Any] = getattr(import_module(f"facert.io.{module}"), attribute)
+    return found
+
+
+def output_format(path: Path, *kinds: Kind) -> Format:
+    """The format to write one of these kinds to.
+
+    Raises
+    ------
+    InputError
+        For an ending to which none of them is written.
+    """
+    found = format_of(path, "write", *kinds)
+    if found is None:
+        known, fix = (
+            ", ".join(endings("write", *kinds)),
+            "Choose a name for the output that ends so.",
+        )
+        raise InputError("output's ending", known, _ending(path), fix, where=str(path))
+    return found
+
+
+def require_output(path: Path, overwrite: bool, *kinds: Kind) -> Format:
+    """The format to write one of these kinds to, found before any work is done.
+
+    Raises
+    ------
+    InputError
+        For an ending to which none of them is written.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    found = output_format(path, *kinds)
+    if path.exists() and not overwrite:
+        raise OutputExistsError(path)
+    return found
+
+
+def write(kind: Kind, thing: object, path: Path, overwrite: bool = False) -> None:
+    """Write a thing of that kind in the format of the name's ending.
+
+    Raises
+    ------
+    InputError
+        For an ending to which this kind is not written, or a thing that the format cannot hold.
+    OutputExistsError
+        When `path` exists and `overwrite` is not set.
+    """
+    function(require_output(path, overwrite, kind).write[kind])(thing, path, overwrite)
+
+
+def unknown_input(path: Path) -> InputError:
+    """The error for a file that holds no take or rig by its ending, with what to do about it."""
+    known = f"{', '.join(endings('read', 'take', 'rig'))}, or a folder of .obj files"
+    advice = _ADVICE.get(path.suffix.lower(), "Export it in one of these formats.")
+    return InputError("kind of file", known, _ending(path), advice, where=str(path))
+
+
+def listed(use: Use, kind: Kind) -> str:
+    """The endings of files from which a kind is read, or to which it is written, for ``--help``."""
+    able = (one for one in FORMATS if kind in one.functions(use) and FOLDER not in one.endings)
+    return ", ".join(", ".join(one.endings) + (one.about if use == "read" else "") for one in able)
+
+
+def table_rows() -> list[str]:
+    """The rows of the docs' table in Markdown: endings, what is read, what is written."""
+    names = (", ".join(f"`{e}`" for e in one.endings if e != FOLDER) for one in FORMATS)
+    return [
+        f"| {name or 'a folder'} | {one.reads} | {one.writes} |".replace("|  |", "| |")
+        for name, one in zip(names, FORMATS, strict=True)
+    ]
+
+
+def _ending(path: Path) -> str:
+    return repr(path.suffix) if path.suffix else "no ending"

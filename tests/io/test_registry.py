@@ -1,0 +1,52 @@
+"""The registry of formats: what is declared is there, and nothing heavy is loaded before its use."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from facert.io.registry import FORMATS, endings, function, listed, table_rows
+
+DOCS = Path(__file__).parents[2]
+TABLE = next(
+    text
+    for text in (
+        (DOCS / name).read_text(encoding="utf-8") for name in ("docs/files.md", "README.md")
+    )
+    if "| ending | read | written |" in text
+)
+
+
+@pytest.mark.parametrize("one", FORMATS, ids=lambda one: one.endings[0])
+def test_every_function_of_a_format_is_there(one) -> None:
+    names = [*one.read.values(), *one.write.values(), one.kind_of, one.targets]
+    assert all(callable(function(name)) for name in names if name)
+
+
+@pytest.mark.parametrize("row", table_rows())
+def test_the_table_in_the_docs_is_that_of_the_registry(row) -> None:
+    assert row in TABLE.splitlines()
+
+
+def test_endings_are_those_of_a_kind() -> None:
+    assert endings("write", "take") == (".h5", ".hdf5", ".livelink.csv", ".csv", ".json")
+    assert endings("read", "mesh") == (".glb", ".gltf", ".obj", ".ply")
+    assert ".csv of Live Link Face or plain, .json of Audio2Face" in listed("read", "take")
+
+
+@pytest.mark.parametrize(
+    ("run", "absent"),
+    [
+        ("from facert.cli.app import app", ("numpy", "torch")),
+        ("from facert import read_take; read_take('a.csv')", ("h5py", "c3d", "pxr", "torch")),
+    ],
+)
+def test_a_format_is_loaded_with_its_first_file(tmp_path, run, absent) -> None:
+    (tmp_path / "a.csv").write_text("time,a\n0,1\n0.02,1\n")
+    check = f"import sys; {run}; print([name for name in {absent} if name in sys.modules])"
+    command = [sys.executable, "-c", check]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
