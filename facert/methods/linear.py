@@ -13,6 +13,7 @@ from sklearn.cross_decomposition import PLSRegression
 from facert.data.arrays import FloatArray
 from facert.methods.folds import blocked_folds
 from facert.methods.regression import Map, SupervisedRegression
+from facert.models.loo import LinearRidge
 
 # Penalties relative to the mean sum of squares of a frame.
 PENALTIES = np.logspace(-7, 2, 46)
@@ -45,60 +46,18 @@ class LinearMap(Map):
 class Ridge(SupervisedRegression):
     """Ridge regression, the penalty of each control chosen by leave-one-out error in closed form.
 
-    There is no free offset: what the labels do not tell falls back on the mean of all known poses.
+    There is no free offset: what the labels leave open falls back on the mean of all known poses.
     """
 
     map_type = LinearMap
 
     def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[LinearMap, dict[str, float]]:
-        found = leave_one_out_ridge(X, Y)
-        figures = {"median penalty": float(np.median(found.penalties))}
-        return LinearMap(found.weights, np.zeros(Y.shape[1])), figures
-
-
-@dataclass(frozen=True, eq=False)
-class RidgeFit:
-    """A ridge regression without offset.
-
-    Parameters
-    ----------
-    weights : array, shape (d_x, d_y)
-        W.
-    penalties : array, shape (d_y,)
-        Of each control, relative to the mean sum of squares of a frame.
-    left_out_errors : array, shape (n, d_y)
-        Each row less what is said of it when it is left out.
-    """
-
-    weights: FloatArray
-    penalties: FloatArray
-    left_out_errors: FloatArray
-
-
-def leave_one_out_ridge(X: FloatArray, Y: FloatArray) -> RidgeFit:
-    """Ridge regression, each control's penalty λ the one of least leave-one-out error.
-
-    With X = U S Vᵀ and h the diagonal of H = U S²(S² + λ)⁻¹ Uᵀ, leaving a row out misses it by
-    (Y - H Y)_i / (1 - h_i).
-
-    Parameters
-    ----------
-    X, Y : arrays, shapes (n, d_x) and (n, d_y)
-        With mean zero, or with an offset that is known.
-    """
-    U, S, Vt = np.linalg.svd(X, full_matrices=False)
-    scale = max(float(np.sum(X * X)) / len(X), np.finfo(np.float64).tiny)
-    penalty = PENALTIES[:, None] * scale
-    filters = S**2 / (S**2 + penalty)  # (penalties, r)
-    projected = U.T @ Y
-    residuals = Y - (U * filters[:, None, :]) @ projected
-    leverages = filters @ (U**2).T
-    errors = residuals / (1.0 - leverages)[:, :, None]
-    best = np.sum(errors**2, axis=1).argmin(axis=0)
-    inverse = S / (S**2 + penalty)
-    weights = Vt.T @ (inverse[best].T * projected)
-    chosen = errors[best, :, np.arange(Y.shape[1])].T
-    return RidgeFit(weights, PENALTIES[best], chosen)
+        ridge = LinearRidge.of_inputs(X, Y)
+        scale = max(float(np.sum(X * X)) / len(X), np.finfo(np.float64).tiny)
+        errors = [np.sum(ridge.errors(scale * penalty) ** 2, axis=0) for penalty in PENALTIES]
+        penalties = PENALTIES[np.argmin(errors, axis=0)]
+        figures = {"median penalty": float(np.median(penalties))}
+        return LinearMap(ridge.slopes(scale * penalties), np.zeros(Y.shape[1])), figures
 
 
 class PLS(SupervisedRegression):

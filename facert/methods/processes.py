@@ -17,6 +17,7 @@ from facert.methods.regression import Map, Variance
 from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.gp.jitter import whitener
 from facert.models.kernels import RegressionKernel, squared_exponential
+from facert.models.loo import leave_one_out_errors
 from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening
@@ -69,13 +70,8 @@ class ProcessMap(Map):
 
     @property
     def left_out_errors(self) -> FloatArray:
-        """Each pose less what would be said of it if it alone were left out, (n, d_y).
-
-        (K⁻¹Y)_i / (K⁻¹)_ii: Rasmussen and Williams (2006), Eq. (5.12).
-        """
-        diagonal = np.einsum("nm,nm->n", self.whitening, self.whitening)
-        errors: FloatArray = self.alpha / diagonal[:, None]
-        return errors
+        """Each pose less what is predicted for it when it alone is left out, (n, d_y)."""
+        return leave_one_out_errors(self.alpha, np.sum(self.whitening**2, axis=1))
 
     @cached_property
     def _on_the_source(self) -> FeatureProcess:

@@ -27,6 +27,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import softmax
 
 from facert.data.arrays import FloatArray
+from facert.models.loo import KernelRidge, leave_one_out_errors
 
 NOISES = np.logspace(-3.5, 2.0, 9)
 TOGETHER = 3.0
@@ -99,21 +100,14 @@ def _scale(given: FloatArray) -> FloatArray:
 
 
 def _solve(R: FloatArray, Y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """R⁻¹ Y, (n, r), and the leave-one-out errors of Y, (n, r), averaged over the noises.
-
-    With R = U Λ Uᵀ + ν I the errors are (R⁻¹ Y)_i / (R⁻¹)_ii (Rasmussen and Williams 2006, Eq.
-    5.12).
-    """
-    variances, U = np.linalg.eigh(R)
-    precisions = 1.0 / (np.maximum(variances, 0.0)[:, None] + NOISES)  # (n, noises)
-    along = U.T @ Y
-    shares = _shares(precisions, along)
-    weights = U @ (along * (precisions @ shares))
-    diagonals = U**2 @ precisions  # of R⁻¹
-    errors = np.zeros_like(Y)
-    for noise in range(len(NOISES)):
-        solved = U @ (along * precisions[:, noise, None])
-        errors += shares[noise] * solved / diagonals[:, noise, None]
+    """R⁻¹ Y, (n, r), and the leave-one-out errors of Y, (n, r), averaged over the noises."""
+    ridge = KernelRidge.of(R, Y)
+    precisions = 1.0 / (ridge.values[:, None] + NOISES)  # (n, noises)
+    weights, errors = np.zeros_like(Y), np.zeros_like(Y)
+    for noise, share in zip(NOISES, _shares(precisions, ridge.projected), strict=True):
+        solved = ridge.weights(noise)
+        weights += share * solved
+        errors += share * leave_one_out_errors(solved, ridge.diagonal(noise))
     return weights, errors
 
 

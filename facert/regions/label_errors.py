@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.models.loo import KernelRidge
 from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening of the markers
@@ -15,8 +16,7 @@ FREE = 10.0  # variance of the constant, relative to the same
 def left_out_errors(frames: FloatArray, labelled: FloatArray, poses: FloatArray) -> FloatArray:
     """Mean squared error of ridge regression at labels left out, relative to a control's variance.
 
-    With K the inner products of half-whitened features, the error at label i is
-    (K⁻¹Y)_i / (K⁻¹)_ii, see `facert.methods.shrinkage`.
+    The kernel is linear in half-whitened features.
 
     Parameters
     ----------
@@ -38,7 +38,6 @@ def left_out_errors(frames: FloatArray, labelled: FloatArray, poses: FloatArray)
     scale, variances = float(np.trace(K)) / len(K), np.sum(Y**2, axis=0)
     if not scale > 0.0:
         return np.ones(poses.shape[1])
-    inverse = np.linalg.inv(K / scale + RIDGE * np.eye(len(K)) + FREE)
-    errors = np.sum((inverse @ Y / inverse.diagonal()[:, None]) ** 2, axis=0)
+    errors = np.sum(KernelRidge.of(K / scale + FREE, Y).errors(RIDGE) ** 2, axis=0)
     moves = variances > 0.0
     return np.where(moves, errors, 1.0) / np.where(moves, variances, 1.0)

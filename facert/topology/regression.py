@@ -21,6 +21,7 @@ from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
 from facert.mesh.rigid import align
+from facert.models.loo import KernelRidge, leave_one_out_errors
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.path import SmoothPath, trust_in_path
 
@@ -177,15 +178,12 @@ def _dual_weights(kernel: FloatArray, targets: FloatArray) -> tuple[FloatArray, 
     eigenvector of the kernel for the eigenvalue 0. A key that is left out, of the mean as well, is
     missed by α_i / (((k + λ)⁻¹)_ii - 1 / (K λ)).
     """
-    values, vectors = np.linalg.eigh(kernel)
-    projected = vectors.transpose(0, 2, 1) @ targets
-    keys, alphas, errors = kernel.shape[1], [], []
+    ridge, keys, alphas, errors = KernelRidge.of(kernel, targets), kernel.shape[1], [], []
     for penalty in PENALTIES:
-        inverse = 1.0 / (np.maximum(values, 0.0) + penalty)  # (G, K)
-        alpha = vectors @ (inverse[:, :, None] * projected)
-        own = np.sum(vectors**2 * inverse[:, None, :], axis=2) - 1.0 / (keys * penalty)
+        alpha = ridge.weights(penalty)
+        diagonal = np.maximum(ridge.diagonal(penalty) - 1.0 / (keys * penalty), LEAST)
         alphas.append(alpha)
-        errors.append(float(np.sum((alpha / np.maximum(own, LEAST)[:, :, None]) ** 2)))
+        errors.append(float(np.sum(leave_one_out_errors(alpha, diagonal) ** 2)))
     return np.array(alphas), np.array(errors)
 
 

@@ -11,7 +11,7 @@ from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import blocked_folds
 from facert.methods.interpolation import SMOOTHING
-from facert.methods.linear import _poses_by_components, leave_one_out_ridge
+from facert.methods.linear import _poses_by_components
 from facert.methods.registry import make_method
 from facert.methods.svr import PackedMap
 from facert.settings import Settings
@@ -52,21 +52,6 @@ def test_each_control_has_its_own_penalty():
     predicted = fitted("ridge", X, Y).predict(X).Y
     np.testing.assert_allclose(predicted[:, :3], Y[:, :3], atol=1e-3)
     assert predicted[:, 3].std() < 0.8 * Y[:, 3].std()
-
-
-def test_ridge_knows_what_it_misses_of_a_row_that_is_left_out():
-    rng = np.random.default_rng(1)
-    X, Y = rng.normal(size=(15, 6)), rng.normal(size=(15, 2))
-    found = leave_one_out_ridge(X, Y)
-    penalties = found.penalties * np.sum(X * X) / len(X)
-
-    for row in range(len(X)):
-        kept = np.arange(len(X)) != row
-        for control, penalty in enumerate(penalties):
-            gram = X[kept].T @ X[kept] + penalty * np.eye(6)
-            weights = np.linalg.solve(gram, X[kept].T @ Y[kept, control])
-            missed = Y[row, control] - X[row] @ weights
-            assert found.left_out_errors[row, control] == pytest.approx(missed, rel=1e-6)
 
 
 def test_all_numbers_of_components_come_from_one_fit():
