@@ -24,8 +24,8 @@ This page is written by `make docs`, from the docstrings.
 """
 # What the public functions take and return, by their modules.
 OTHERS = {
-    "facert.posing.suggestion": ("Suggestion",),
-    "facert.posing.pose": ("CompletedPose",),
+    "facert.posing.suggested_frames": ("Suggestion",),
+    "facert.posing.completed_pose": ("CompletedPose",),
     "facert.retarget.options": ("RetargetOptions",),
     "facert.retarget.adjustments": ("Adjustments",),
     "facert.retarget.model": ("TrainedModel",),

@@ -33,8 +33,8 @@ from facert.data.take import Source
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
 from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
+from facert.posing.completed_pose import complete_pose
 from facert.posing.completion import Completion
-from facert.posing.pose import complete_pose
 from facert.preprocess.known_poses import KnownPoses
 from facert.render.faces import posed_face
 from facert.render.sheet import render_sheet

@@ -25,7 +25,7 @@ from experiments.tracks import read_track
 from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray, rms
 from facert.evaluation.comparison import Estimate, paired_ratio
-from facert.posing.suggestion import suggest_frames
+from facert.posing.suggested_frames import suggest_frames
 from facert.retarget.options import AS_IT_IS
 
 POSABLE, UNLABELLED, TESTED = 0.6, 100, 300

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
-    from facert.posing.pose import complete_pose
-    from facert.posing.suggestion import suggest_frames
+    from facert.posing.completed_pose import complete_pose
+    from facert.posing.suggested_frames import suggest_frames
     from facert.retarget.retargeter import Retargeter, load
     from facert.retarget.training import train
     from facert.settings import Settings
@@ -60,11 +60,11 @@ _HOMES = {
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),
-    "complete_pose": ("facert.posing.pose", "complete_pose"),
+    "complete_pose": ("facert.posing.completed_pose", "complete_pose"),
     "load": ("facert.retarget.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),
-    "suggest_frames": ("facert.posing.suggestion", "suggest_frames"),
+    "suggest_frames": ("facert.posing.suggested_frames", "suggest_frames"),
     "train": ("facert.retarget.training", "train"),
     "write_take": ("facert.io.formats", "write_take_file"),
 }

@@ -26,11 +26,11 @@ from facert.data.rig import MeshSequence
 from facert.io.formats import read_rig_file
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.render.shade import frame_mesh, shade
-from facert.topology.alignment import alignment_matrix
+from facert.topology.alignment_matrix import alignment_matrix
 from facert.topology.driving import SURFACE, FaceDriver, smooth_energy
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings
 from facert.topology.solution import Elimination
-from facert.topology.suggestion import suggest_points
+from facert.topology.suggested_points import suggest_points
 
 POINTS = 80
 

@@ -24,7 +24,7 @@ from facert.data.rig import MeshSequence
 from facert.render.faces import Face
 from facert.render.sheet import render_sheet
 from facert.topology.driving import DEFAULT, METHODS, FaceDriver
-from facert.topology.suggestion import suggest_points
+from facert.topology.suggested_points import suggest_points
 
 OWN = ("smooth", "framework", "literal")
 FACES = 10

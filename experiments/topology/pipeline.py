@@ -29,7 +29,7 @@ from facert.topology import driving, propagation
 from facert.topology.driving import FaceDriver
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate
-from facert.topology.suggestion import suggest_points
+from facert.topology.suggested_points import suggest_points
 
 EXPRESSIONS = {11: "jawOpen", 12: "mouthSmileLeft", 13: "mouthFrownLeft", 14: "mouthPucker"}
 KEYS = np.linspace(0, SEGMENT - 1, 10).round().astype(int)

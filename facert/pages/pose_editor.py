@@ -8,9 +8,9 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.take import Controls
+from facert.posing.completed_pose import FAR
 from facert.posing.completion import Completion, Posed
 from facert.posing.correction import correct
-from facert.posing.pose import FAR
 from facert.preprocess.known_poses import Given, KnownPoses
 
 KEPT = 32  # sets of pinned controls whose completion is kept: going back to one costs nothing

@@ -13,8 +13,8 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.errors import InputError
 from facert.io.take import write_take
-from facert.posing.pose import LEAST
-from facert.posing.suggestion import Suggestion, suggest_frames
+from facert.posing.completed_pose import LEAST
+from facert.posing.suggested_frames import Suggestion, suggest_frames
 from facert.preprocess.known_poses import KnownPoses, keep
 from facert.retarget.retargeter import Retargeter
 from facert.retarget.training import train

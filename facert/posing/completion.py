@@ -1,6 +1,6 @@
 """The pose to expect given some of its controls, and others that are plausible too.
 
-`facert.posing.regression` predicts the rest of the pose. How far it may be off is told by the
+`facert.posing.pose_regression` predicts the rest of the pose. How far it may be off is told by the
 known poses: each, left out, misses its own rest by a vector e_i. A plausible pose is the predicted
 one plus the error of a known pose that has similar given controls,
 
@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.posing.regression import PoseRegression
+from facert.posing.pose_regression import PoseRegression
 from facert.preprocess.known_poses import Given, KnownPoses
 
 NEAR = 8.0  # γ

@@ -16,12 +16,13 @@ from typing import Literal
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.errors import InputError
+from facert.mesh.rigid import align
 from facert.topology import laplacian
-from facert.topology.alignment import alignment_matrix
-from facert.topology.followers import Follower, followers
+from facert.topology.alignment_matrix import alignment_matrix
 from facert.topology.labels import checked_labels, lacking_components, require_enough_labels
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings
 from facert.topology.radial_basis import Kernel, radial_basis
@@ -29,6 +30,7 @@ from facert.topology.solution import Dense, Elimination, Interpolant
 
 SURFACE = 2  # d
 SMOOTHNESS = 0.3  # λ of the uniform Laplacian
+PULL = 1e-6  # of what is carried, towards no rotation
 DENSE = 2**25  # most entries of an influence matrix, 256 MiB
 Energy = Callable[[FloatArray, IntArray], sparse.csc_array]
 LooseParts = Literal["refuse", "carry"]
@@ -217,3 +219,58 @@ def _checked_neutral(neutral: FloatArray) -> FloatArray:
             "/neutral", "finite positions (V, 3)", f"{neutral.shape}, or NaN", "Check the export."
         )
     return neutral
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """A part that follows its anchors.
+
+    Parameters
+    ----------
+    part : array of int, shape (n,)
+        Vertices that are carried.
+    anchors : array of int, shape (m,)
+        Vertices that they follow.
+    """
+
+    part: IntArray
+    anchors: IntArray
+
+    def carry(self, neutral: FloatArray, deformed: FloatArray) -> None:
+        """Move the part in every frame of `deformed` (T, V, 3), in place.
+
+        Parameters
+        ----------
+        neutral : array, shape (V, 3)
+        deformed : array, shape (T, V, 3)
+            With the anchors where they should be.
+        """
+        anchors = deformed[:, self.anchors]
+        motion = align(neutral[self.anchors], anchors, np.ones(anchors.shape[:2]), PULL)
+        deformed[:, self.part] = motion.apply(neutral[self.part])
+
+
+def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> list[Follower]:
+    """One for each connected component that is not held by labels.
+
+    Parameters
+    ----------
+    vertices : array, shape (V, 3)
+    components : array of int, shape (V,)
+        The number of the component of each vertex.
+    held : array of bool, shape (V,)
+        Which vertices belong to a component with labels.
+    """
+    if held.all():
+        return []
+    candidates = np.flatnonzero(held)
+    tree = cKDTree(vertices[candidates])
+    found = []
+    for component in np.unique(components[~held]):
+        part = np.flatnonzero(components == component)
+        distance, nearest = map(np.asarray, tree.query(vertices[part]))
+        # The nearest labelled component: a part between two does not follow both.
+        home = components[candidates[nearest[distance.argmin()]]]
+        near = candidates[nearest]
+        found.append(Follower(part, np.unique(near[components[near] == home])))
+    return found

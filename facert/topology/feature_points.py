@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import NameIndex, nearest
 from facert.data.rig import Mesh
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
 from facert.topology.labels import checked_labels
-from facert.topology.placement import (
-    Fit,
-    carried_over,
-    mapped_vertices,
-    named_vertices,
-    nearest_vertices,
-    require_near,
-)
 
 Where = Mapping[str, object] | Literal["names", "nearest"]
+Fit = Literal["none", "uniform", "axes"]
+
+FAR = 0.1  # of the face's radius: farther from its vertices, a point is one of another face
+_VERTEX_NAME = re.compile(r"v?(\d{1,9})", re.IGNORECASE)
 
 log = logging.getLogger("facert")
 
@@ -102,3 +101,129 @@ def _without_gaps(positions: FloatArray) -> FloatArray:
     if hidden:
         log.info("%d of %d positions were hidden: filled", hidden, flat.size // 3)
     return fill_gaps(flat).reshape(positions.shape)
+
+
+def named_vertices(names: Sequence[str]) -> IntArray:
+    """The vertices that points are named after, as in ``v1204`` or ``1204``, (M,).
+
+    Raises
+    ------
+    InputError
+        When a name is another.
+    """
+    found = [_VERTEX_NAME.fullmatch(name) for name in names]
+    others = [name for name, match in zip(names, found, strict=True) if match is None]
+    if others:
+        raise InputError(
+            "names of the points",
+            "vertices, such as v1204",
+            repr(others[0]),
+            "Tell the vertex of each point with --map, or take the nearest ones with --auto.",
+        )
+    return np.array([int(match[1]) for match in found if match], dtype=np.int64)
+
+
+def mapped_vertices(table: Mapping[str, object], names: Sequence[str]) -> tuple[IntArray, IntArray]:
+    """What a map from names to vertices says of some points.
+
+    Parameters
+    ----------
+    table : mapping
+        From the name of a point to its vertex; spellings are forgiven.
+    names : sequence of str
+        Of the points that there are; those that the map leaves out are not used.
+
+    Returns
+    -------
+    points, vertices : arrays of int, shape (M,)
+
+    Raises
+    ------
+    InputError
+        For a vertex that is no whole number, or a name that is not among the points.
+    """
+    index = NameIndex(names)
+    points, vertices = [], []
+    for name, vertex in table.items():
+        if isinstance(vertex, bool) or not isinstance(vertex, int):
+            raise InputError(
+                f"--map: {name}", "the number of a vertex", f"{vertex!r}", "As in chin = 1204."
+            )
+        place = index.find(name)
+        if place is None:
+            near = nearest(name, names)
+            hint = f"nearest: {near!r}" if near else f"{len(names)} other names"
+            raise InputError(f"--map: {name}", "a point of the take", hint, "Correct the map.")
+        points.append(place)
+        vertices.append(vertex)
+    if not points:
+        raise InputError("--map", "lines such as chin = 1204", "none", "Name some points.")
+    return np.array(points, dtype=np.int64), np.array(vertices, dtype=np.int64)
+
+
+def nearest_vertices(rest: FloatArray, vertices: FloatArray) -> IntArray:
+    """The vertex nearest to each point at rest, (M,).
+
+    Parameters
+    ----------
+    rest : array, shape (M, 3)
+        In the mesh's space and units.
+    vertices : array, shape (V, 3)
+
+    Raises
+    ------
+    InputError
+        When points lie far from the mesh, or share a vertex.
+    """
+    distance, found = map(np.asarray, cKDTree(vertices).query(rest))
+    require_near(distance, vertices)
+    unique, counts = np.unique(found, return_counts=True)
+    if (counts > 1).any():
+        raise InputError(
+            "--auto",
+            "a vertex for each point",
+            f"vertex {unique[counts > 1][0]} nearest to several",
+            "Tell the vertices with --map.",
+        )
+    return np.asarray(found, dtype=np.int64)
+
+
+def require_near(distance: FloatArray, vertices: FloatArray) -> None:
+    """Refuse points that, by their distances (M,), are not of this face."""
+    radius = float(np.sqrt(np.mean(np.sum((vertices - vertices.mean(axis=0)) ** 2, axis=1))))
+    if np.median(distance) > FAR * radius:
+        raise InputError(
+            "points",
+            "positions on the mesh when it rests",
+            f"half of them farther than {np.median(distance):.3g} from it",
+            "For another face's points, or other units, give --map (or v1204-names) and --fit.",
+        )
+
+
+def carried_over(points: FloatArray, rest: FloatArray, home: FloatArray, fit: Fit) -> FloatArray:
+    """Points of one face as points of another: home + s (points - rest).
+
+    Parameters
+    ----------
+    points : array, shape (T, M, 3)
+    rest : array, shape (M, 3)
+        The points when the face they come from rests.
+    home : array, shape (M, 3)
+        Their vertices on the neutral of the other face.
+    fit : {"none", "uniform", "axes"}
+        Leave the points as they are; or let s be the ratio of the faces' sizes, over all axes or
+        for each alone.
+
+    Raises
+    ------
+    InputError
+        When the points do not extend along an axis that is to be scaled.
+    """
+    if fit == "none":
+        return points
+    sizes = [np.std(each, axis=0) for each in (rest, home)]
+    if fit == "uniform":
+        sizes = [np.full(3, np.linalg.norm(size)) for size in sizes]
+    if not (sizes[0] > 0).all():
+        raise InputError("--fit", "points that spread in space", "flat ones", "Use uniform.")
+    return np.asarray(home + sizes[1] / sizes[0] * (points - rest))

@@ -7,12 +7,11 @@ space is not offered: on a face it bridges the lips.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -31,34 +30,12 @@ class Neighbourhoods:
     members : array of int, shape (sum of sizes,)
         Indices of points.
     sizes : array of int
-        k_i, how many of the members belong to each neighbourhood.
-
-    Raises
-    ------
-    InputError
-        When a neighbourhood is empty, names a point twice, or names one that does not exist.
+        k_i, how many of the members, all different, belong to each neighbourhood.
     """
 
     points: int
     members: IntArray
     sizes: IntArray
-
-    def __post_init__(self) -> None:
-        bad = (self.members < 0) | (self.members >= self.points)
-        if bad.any():
-            found = f"{self.members[bad][0]}"
-            raise _bad(f"points from 0 to {self.points - 1}", found)
-        if (self.sizes < 1).any():
-            raise _bad("at least one point each", "an empty one")
-        order = np.lexsort((self.members, self.owners))
-        same = (np.diff(self.members[order]) == 0) & (np.diff(self.owners[order]) == 0)
-        if same.any():
-            raise _bad("different points in each", f"{self.members[order][1:][same][0]} twice")
-
-    @cached_property
-    def owners(self) -> IntArray:
-        """For each member, the number of its neighbourhood."""
-        return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     def by_size(self) -> Iterator[IntArray]:
         """The neighbourhoods of each size k together, (n_k, k)."""
@@ -73,27 +50,11 @@ class Neighbourhoods:
 
         Points are connected when they share a neighbourhood: nothing else carries a label to them.
         """
-        starts = np.cumsum(self.sizes) - self.sizes
-        edges = (np.ones(len(self.members)), (self.members[starts][self.owners], self.members))
+        first = self.members[np.cumsum(self.sizes) - self.sizes]
+        edges = (np.ones(len(self.members)), (np.repeat(first, self.sizes), self.members))
         graph = sparse.coo_array(edges, shape=(self.points, self.points)).tocsr()
         _, numbers = connected_components(graph, directed=False)
         return np.asarray(numbers, dtype=np.int64)
-
-
-def given_lists(lists: Sequence[ArrayLike], points: int) -> Neighbourhoods:
-    """Neighbourhoods as they are given.
-
-    Parameters
-    ----------
-    lists : sequence of sequences of int
-        The points of each neighbourhood, the point itself among them.
-    points : int
-        N.
-    """
-    arrays = [np.atleast_1d(np.asarray(each, dtype=np.int64)) for each in lists]
-    sizes = np.array([len(each) for each in arrays], dtype=np.int64)
-    members = np.concatenate(arrays) if arrays else np.empty(0, dtype=np.int64)
-    return Neighbourhoods(points, members, sizes)
 
 
 def temporal_windows(frames: int, width: int) -> Neighbourhoods:
@@ -167,7 +128,3 @@ def adjacency(faces: IntArray, vertices: int) -> sparse.csr_array:
     joined = edges.tocsr()  # sums what is doubled
     joined.data[:] = 1.0
     return joined
-
-
-def _bad(expected: str, found: str) -> InputError:
-    return InputError("neighbourhoods", expected, found, "Check the lists.")

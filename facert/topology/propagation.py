@@ -26,13 +26,14 @@ from scipy.interpolate import CubicSpline
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.topology.alignment import alignment_matrix
+from facert.topology.affine import affine_regression, scaled_points, scaled_source
+from facert.topology.alignment_matrix import alignment_matrix
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.labels import needed_labels, require_enough_labels
 from facert.topology.laplacian import path_energy
+from facert.topology.local_ridge import local_ridge
 from facert.topology.neighbourhoods import temporal_windows
 from facert.topology.radial_basis import Kernel, radial_basis
-from facert.topology.regression import affine_regression, local_ridge, scaled_points, scaled_source
 from facert.topology.solution import Elimination
 
 STILL = 0.01

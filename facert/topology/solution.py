@@ -4,15 +4,15 @@ The minimiser is linear in the labels, so that one factorisation serves every co
 frame; and where labels are few, the matrix A with Y = A Ŷ, the *influence* of each label on each
 point, is found once and a frame costs one product.
 
-Points are rows here and columns in the paper.
+Labels are met exactly: β → ∞ in (17). From 10⁴ on (18) as it is written is as good as that, since B
+has no unit. Points are rows here and columns in the paper.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from scipy import sparse
@@ -26,57 +26,31 @@ SINGULAR = 1e-13
 """A pivot below this share of the largest diagonal entry is rounding."""
 
 
-class Interpolant(ABC):
-    """A linear map from what is given at M labelled points to all N points."""
-
-    @property
-    @abstractmethod
-    def influence(self) -> FloatArray:
-        """A, (N, M): how much of each label reaches each point; rows add up to 1."""
-
-    @abstractmethod
-    def __call__(self, labels: FloatArray) -> FloatArray:
-        """All points (N, ...) from labels (M, ...); any number of coordinates and frames."""
-
-
 @dataclass(frozen=True, eq=False)
-class Dense(Interpolant):
-    """An interpolant that is known by its influence matrix alone.
+class Dense:
+    """A linear map from M labelled points to all N, known by its influence matrix.
 
     Parameters
     ----------
-    matrix : array, shape (N, M)
+    influence : array, shape (N, M)
+        A: how much of each label reaches each point; rows add up to 1.
     """
 
-    matrix: FloatArray
-
-    @property
-    def influence(self) -> FloatArray:
-        """The matrix itself."""
-        return self.matrix
+    influence: FloatArray
 
     def __call__(self, labels: FloatArray) -> FloatArray:
-        """A Ŷ."""
+        """All points Y = A Ŷ, (N, ...), from labels (M, ...); any number of coordinates."""
         flat = labels.reshape(len(labels), -1)
         with one_thread():
             # Transposed: BLAS is quicker at (few, M) times (M, N) than the other way round.
-            found = (flat.T @ self.matrix.T).T
+            found = (flat.T @ self.influence.T).T
         return np.asarray(found.reshape(-1, *labels.shape[1:]))
 
 
-class _Solved(Interpolant):
-    """An interpolant that solves a system for whatever labels it is given."""
+class Elimination:
+    """The linear map from labels to the points of least energy, by sparse elimination.
 
-    _labelled: IntArray
-
-    @cached_property
-    def influence(self) -> FloatArray:
-        """A, (N, M): the solution for labels that are 1 at one point and 0 at the others."""
-        return self(np.eye(len(self._labelled)))
-
-
-class Elimination(_Solved):
-    """Labels met exactly: β → ∞ in (17), where B₂₂ Y₂ = -B₁₂ᵀ Ŷ is left of (18).
+    With β → ∞, B₂₂ Y₂ = -B₁₂ᵀ Ŷ is left of (18).
 
     Parameters
     ----------
@@ -96,60 +70,30 @@ class Elimination(_Solved):
         self._free = np.setdiff1d(np.arange(B.shape[0]), labelled)
         columns = B[:, self._free]
         self._B12 = columns[labelled]
-        self._solver = _Factor(columns[self._free], self._free) if len(self._free) else None
+        self._solver = _Factor(columns[self._free], self._free)
+
+    @property
+    def influence(self) -> FloatArray:
+        """A, (N, M): the solution for labels that are 1 at one point and 0 at the others."""
+        return self(np.eye(len(self._labelled)))
 
     def __call__(self, labels: FloatArray) -> FloatArray:
-        """Y = [Ŷ, -B₂₂⁻¹ B₁₂ᵀ Ŷ] in the order of the points."""
+        """Y = [Ŷ, -B₂₂⁻¹ B₁₂ᵀ Ŷ] (19) in the order of the points, (N, ...)."""
         flat = labels.reshape(len(labels), -1)
         Y = np.empty((self._points, flat.shape[1]))
         Y[self._labelled] = flat
-        if self._solver is not None:
-            Y[self._free] = self._solver(-(self._B12.T @ flat))
+        Y[self._free] = self._solver(-(self._B12.T @ flat))
         return Y.reshape(self._points, *labels.shape[1:])
 
     def green(self, point: int) -> FloatArray:
         """How all points give way to a unit force on one of them, (N,): a column of B₂₂⁻¹."""
         response = np.zeros(self._points)
-        if self._solver is not None:
-            response[self._free] = self._solver((self._free == point).astype(np.float64)[:, None])[
-                :, 0
-            ]
+        force = (self._free == point).astype(np.float64)
+        response[self._free] = self._solver(force[:, None])[:, 0]
         return response
 
 
-class Weighted(_Solved):
-    """Labels met as well as the weight β asks: (18) as it is written.
-
-    Parameters
-    ----------
-    B : sparse array, shape (N, N)
-        Symmetric, positive semidefinite.
-    labelled : array of int, shape (M,)
-        Different points.
-    beta : float
-        β > 0. From 10⁴ on the labels are as good as exact, since B has no unit.
-
-    Raises
-    ------
-    InputError
-        When the labels do not determine all points.
-    """
-
-    def __init__(self, B: sparse.csc_array, labelled: IntArray, beta: float) -> None:
-        if not (np.isfinite(beta) and beta > 0):
-            raise InputError("beta", "a positive number", f"{beta}", "For instance 1e4.")
-        self._labelled, self._beta = labelled, beta
-        weights = np.zeros(B.shape[0])
-        weights[labelled] = beta
-        self._points = B.shape[0]
-        self._solver = _Factor(B + sparse.diags_array(weights), np.arange(B.shape[0]))
-
-    def __call__(self, labels: FloatArray) -> FloatArray:
-        """Y of (19)."""
-        flat = labels.reshape(len(labels), -1)
-        right = np.zeros((self._points, flat.shape[1]))
-        right[self._labelled] = self._beta * flat
-        return self._solver(right).reshape(self._points, *labels.shape[1:])
+Interpolant = Dense | Elimination
 
 
 class _Factor:
@@ -160,6 +104,8 @@ class _Factor:
     """
 
     def __init__(self, A: sparse.csc_array, points: IntArray) -> None:
+        if not len(points):
+            return
         diagonal = A.diagonal()
         lost = np.flatnonzero(diagonal <= SINGULAR * diagonal.max(initial=0.0))
         if len(lost):
@@ -180,6 +126,8 @@ class _Factor:
             raise _undetermined(int(points[place]))
 
     def __call__(self, right: FloatArray) -> FloatArray:
+        if not len(right):
+            return right
         with one_thread():
             return np.asarray(self._lu.solve(np.asfortranarray(right)))
 

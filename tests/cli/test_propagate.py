@@ -8,7 +8,7 @@ import facert as api
 from facert.cli.commands import drive, propagate
 from facert.data.take import Source
 from facert.topology import driving, propagation
-from facert.topology.takes import Propagation, propagate_poses
+from facert.topology.propagated_takes import Propagation, propagate_poses
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 import facert
 from facert.data.take import Controls
 from facert.pages.pose_editor import KEPT, PoseEditor, slider_bounds
-from facert.posing.pose import known_poses
+from facert.posing.completed_pose import known_poses
 
 NAMES = ["jaw", "smile", "brow", "blink"]
 

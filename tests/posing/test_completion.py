@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import rms
-from facert.posing import regression
+from facert.posing import pose_regression
 from facert.posing.completion import Completion
-from facert.posing.regression import PoseRegression
+from facert.posing.pose_regression import PoseRegression
 from facert.preprocess.known_poses import MOST, Given, KnownPoses, keep
 
 
@@ -41,7 +41,7 @@ def solved(R, Y, noise):
 
 
 def test_with_one_noise_the_regression_is_a_gaussian_process(monkeypatch):
-    monkeypatch.setattr(regression, "NOISES", np.array([0.1]))
+    monkeypatch.setattr(pose_regression, "NOISES", np.array([0.1]))
     poses, values = sheet(30), sheet(5, seed=2)[:, :3]
     X, Y = poses[:, :3], poses[:, 3:]
     learned = PoseRegression.learn(X, Y)
@@ -58,7 +58,7 @@ def test_with_one_noise_the_regression_is_a_gaussian_process(monkeypatch):
 
 
 def test_errors_are_those_of_leaving_poses_out(monkeypatch):
-    monkeypatch.setattr(regression, "NOISES", np.array([0.1]))
+    monkeypatch.setattr(pose_regression, "NOISES", np.array([0.1]))
     poses = sheet(25)
     learned = PoseRegression.learn(poses[:, :3], poses[:, 3:])
     Y, inputs = poses[:, 3:] - poses[:, 3:].mean(0), learned.inputs

@@ -11,8 +11,8 @@ import pytest
 import facert
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.posing import suggestion as frames_module
-from facert.posing.suggestion import APART, suggest_frames
+from facert.posing import suggested_frames as frames_module
+from facert.posing.suggested_frames import APART, suggest_frames
 
 COUNT = 6
 

@@ -112,7 +112,7 @@ def test_known_poses_are_told_apart_and_poses_completed(trained, take):
 
 
 def test_frames_are_suggested_where_regions_are_uncertain(trained, make_take):
-    from facert.posing.suggestion import suggest_frames
+    from facert.posing.suggested_frames import suggest_frames
 
     assert (
         len(suggest_frames(make_take(frames=30, posed=0, animation=0), 3, trained("auto")).frames)

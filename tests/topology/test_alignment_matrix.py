@@ -4,9 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.errors import InputError
-from facert.topology.alignment import alignment_matrix
-from facert.topology.neighbourhoods import given_lists, mesh_rings, temporal_windows
-from facert.topology.tangent import local_structures
+from facert.topology.alignment_matrix import alignment_matrix, tangent_coordinates
+from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings, temporal_windows
 
 
 def algorithm_1(X, neighbourhoods, dim):
@@ -32,12 +31,14 @@ def test_batches_build_what_algorithm_1_builds(sheet, dim):
 def test_tangent_coordinates_are_an_orthogonal_projection_and_reconstruct_a_plane(sheet):
     points, faces = sheet
     flat = points * [1, 1, 0]
-    for structures in local_structures(flat, mesh_rings(faces, len(points)), 2, 1e-6):
-        local = flat[structures.members]
-        centred = local - structures.means[:, None, :]
-        projected = centred @ structures.directions.transpose(0, 2, 1)  # (1)
-        np.testing.assert_allclose(structures.coordinates, projected, atol=1e-12)
-        np.testing.assert_allclose(structures.reconstruct(projected), local, atol=1e-12)  # (2)
+    for members in mesh_rings(faces, len(points)).by_size():
+        local = flat[members]
+        centred = local - local.mean(axis=1, keepdims=True)
+        g, spread = tangent_coordinates(local, 2)
+        coordinates = g * spread[:, None, :]
+        U = np.linalg.pinv(coordinates) @ centred  # (2): the points from their coordinates
+        np.testing.assert_allclose(coordinates @ U, centred, atol=1e-12)
+        np.testing.assert_allclose(centred @ U.transpose(0, 2, 1), coordinates, atol=1e-12)  # (1)
 
 
 def test_B_is_symmetric_semidefinite_and_blind_to_constants(sheet):
@@ -92,7 +93,7 @@ def test_a_guard_is_a_penalty_on_the_local_maps(guard, seed):
     """W of a single window is what (6) leaves of Y when D_i costs its square times μ²."""
     rng = np.random.default_rng(seed)
     X, Y = rng.normal(size=(7, 3)) * [1.0, 0.1, 0.01], rng.normal(size=(7, 2))
-    window = given_lists([range(7)], 7)
+    window = Neighbourhoods(7, np.arange(7), np.array([7]))
     B = alignment_matrix(X, window, 3, guard).toarray()
     x, y = X - X.mean(axis=0), Y - Y.mean(axis=0)
     noise = guard * np.linalg.norm(x, 2)

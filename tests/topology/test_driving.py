@@ -8,7 +8,7 @@ from facert.errors import InputError
 from facert.io.formats import read_rig_file, read_take_file
 from facert.mesh.capture import simulate_capture
 from facert.topology.driving import METHODS, FaceDriver
-from facert.topology.suggestion import suggest_points
+from facert.topology.suggested_points import suggest_points
 
 LABELLED = np.array([0, 7, 64, 71, 27, 30, 44])
 LINEAR = [name for name, method in METHODS.items() if method.quantity == "displacements"]

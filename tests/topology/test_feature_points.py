@@ -4,9 +4,9 @@ import pytest
 from facert.data.rig import Mesh
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.topology.feature_points import feature_points
-from facert.topology.placement import (
+from facert.topology.feature_points import (
     carried_over,
+    feature_points,
     mapped_vertices,
     named_vertices,
     nearest_vertices,

@@ -7,7 +7,6 @@ from facert.errors import InputError
 from facert.topology.neighbourhoods import (
     Neighbourhoods,
     adjacency,
-    given_lists,
     mesh_rings,
     temporal_windows,
 )
@@ -69,7 +68,8 @@ def test_components_are_what_neighbourhoods_join(two_sheets):
     points, faces = two_sheets
     components = mesh_rings(faces, len(points)).components
     assert components.tolist() == [0] * 72 + [1] * 72
-    assert given_lists([[0, 1], [2, 3], [1, 3]], 5).components.tolist() == [0, 0, 0, 0, 1]
+    chain = Neighbourhoods(5, np.array([0, 1, 2, 3, 1, 3, 4]), np.array([2, 2, 2, 1]))
+    assert chain.components.tolist() == [0, 0, 0, 0, 1]
 
 
 def test_groups_by_size_hold_every_neighbourhood_once(sheet):
@@ -77,15 +77,6 @@ def test_groups_by_size_hold_every_neighbourhood_once(sheet):
     rings = mesh_rings(faces, len(points))
     grouped = [sorted(row) for members in rings.by_size() for row in members.tolist()]
     assert sorted(grouped) == sorted(lists(rings))
-
-
-@pytest.mark.parametrize(
-    ("given", "expected"),
-    [([[0, 9]], "found 9"), ([[0, -1]], "found -1"), ([[]], "empty"), ([[0, 1, 0]], "0 twice")],
-)
-def test_bad_lists_are_refused(given, expected):
-    with pytest.raises(InputError, match=expected):
-        given_lists(given, 3)
 
 
 def test_faces_use_vertices_that_exist_and_a_ring_is_at_least_one():

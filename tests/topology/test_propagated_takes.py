@@ -6,8 +6,8 @@ import pytest
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.topology.keyed import KeyedPerformance
+from facert.topology.propagated_takes import Propagation, propagate_poses, propagate_positions
 from facert.topology.propagation import propagate
-from facert.topology.takes import Propagation, propagate_poses, propagate_positions
 
 
 @pytest.fixture

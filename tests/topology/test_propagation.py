@@ -5,10 +5,11 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, RBFInterpolator
 
 from facert.errors import InputError
+from facert.topology.affine import scaled_source
 from facert.topology.keyed import KeyedPerformance, even_keys
+from facert.topology.local_ridge import PENALTIES, _dual_weights
 from facert.topology.propagation import METHODS, propagate
 from facert.topology.radial_basis import radial_basis
-from facert.topology.regression import PENALTIES, _dual_weights, scaled_source
 
 FREE_OF_SPACE = [name for name in METHODS if name not in ("laplacian", "affine", "rbf-thin-plate")]
 

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from facert.topology.keyed import KeyedPerformance
-from facert.topology.path import MOST, SmoothPath, trust_in_path
 from facert.topology.propagation import propagate
+from facert.topology.smooth_path import MOST, SmoothPath, trust_in_path
 
 KEYS = np.array([40, 3, 12, 55, 22])
 SHARES = st.floats(1e-3, 10.0)

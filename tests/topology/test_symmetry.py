@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.rig import Rig
-from facert.topology.suggestion import suggest_points
-from facert.topology.symmetry import mirror_vertices
+from facert.topology.suggested_points import mirror_vertices, suggest_points
 
 
 def half(seed, count=30):

@@ -46,7 +46,7 @@ def suggest(
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.render.sheet import draw_points
-    from facert.topology.suggestion import suggest_points
+    from facert.topology.suggested_points import suggest_points
 
     if picture is not None:
         require_picture_name(picture, overwrite)
@@ -65,7 +65,7 @@ def _table(mesh: Mesh, chosen: IntArray) -> Table:
     from rich import box
     from rich.table import Table
 
-    from facert.topology.symmetry import mirror_vertices
+    from facert.topology.suggested_points import mirror_vertices
 
     unit = f", {mesh.units}" if mesh.units else ""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)

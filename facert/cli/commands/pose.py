@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from facert.data.take import Take
-    from facert.posing.pose import CompletedPose
+    from facert.posing.completed_pose import CompletedPose
     from facert.retarget.retargeter import Retargeter
 
 SMALL = 0.005  # of a control's range: such values are not worth a line

@@ -74,7 +74,7 @@ def command(
     from facert.errors import reading
     from facert.io.formats import read_source_file, read_take_file, write_take_file
     from facert.io.registry import require_output
-    from facert.topology.takes import Propagation, propagate_poses, propagate_positions
+    from facert.topology.propagated_takes import Propagation, propagate_poses, propagate_positions
 
     require_output(output, overwrite, "take")
     how = Propagation(method, window, dim, limits.value)

@@ -15,7 +15,7 @@ from facert.data.text import plural
 if TYPE_CHECKING:
     from facert.data.arrays import IntArray
     from facert.data.take import Take
-    from facert.posing.suggestion import Suggestion
+    from facert.posing.suggested_frames import Suggestion
     from facert.retarget.retargeter import Retargeter
 
 LABELS = "labels"
@@ -54,7 +54,7 @@ def command(
     from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
-    from facert.posing.suggestion import suggest_frames
+    from facert.posing.suggested_frames import suggest_frames
     from facert.render.faces import require_drawable
     from facert.render.sheet import MAX_FRAMES, contact_sheet
 

@@ -5,7 +5,7 @@ from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.topology.driving import FaceDriver, smooth_energy
 from facert.topology.solution import Elimination
-from facert.topology.suggestion import EVEN, rim_vertices, suggest_points
+from facert.topology.suggested_points import EVEN, rim_vertices, suggest_points
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ with c the mean over the keys and the kernel k_p = l_p + κ exp(-d_p² / 2 ℓ²
 is l_p(t, u) = Σ_q w_pq x_q(t)·x_q(u), where w_pq = exp(-|p - q| / h) + w₀ falls with the distance
 of the feature points at rest, and d_p is the distance that belongs to it,
 d_p²(t, u) = l_p(t, t) + l_p(u, u) - 2 l_p(t, u). k is the covariance of a smooth path in time, with
-the weight τ that it deserves (`facert.topology.path`). The results for several λ and κ are averaged
-by how well each does when a key is left out.
+the weight τ that it deserves (`facert.topology.smooth_path`). The results for several λ and κ are
+averaged by their leave-one-out errors.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
-from facert.mesh.rigid import align
 from facert.models.loo import KernelRidge, leave_one_out_errors
+from facert.topology.affine import scaled_source
 from facert.topology.keyed import KeyedPerformance
-from facert.topology.path import SmoothPath, trust_in_path
+from facert.topology.smooth_path import SmoothPath, trust_in_path
 
 REACH = 0.3  # h, in units of the face's radius
 EVERYWHERE = 0.003  # w₀
@@ -32,9 +32,7 @@ CURVATURES = (0.03, 0.3)  # κ
 BATCH = 256  # frames: for bounded memory
 LENGTH = 2.0  # ℓ, where two keys are √2 apart
 TRUST = 0.1  # in leave-one-out errors, a key: see _trusts
-PULL = 1e-8  # towards no rotation: decides where the motion does not
 LEAST = 1e-12  # of what a key may weigh in its own prediction
-RANK = 1e-5  # least share of the largest singular value that is no rounding, in an affine map
 
 
 def local_ridge(take: KeyedPerformance) -> FloatArray:
@@ -48,43 +46,6 @@ def local_ridge(take: KeyedPerformance) -> FloatArray:
         return _kernel_ridge(take, nothing, np.ones((1, take.source.shape[1])))
     guess = scaled_source(take)
     return guess + _kernel_ridge(take, guess, _nearness(take.source.mean(axis=0)))
-
-
-def affine_regression(take: KeyedPerformance) -> FloatArray:
-    """The affine map from whole frames to the target that has the smallest entries, (T, G, C)."""
-    mean, X = take.labels.mean(axis=0), take.frames - take.frames[take.keys].mean(axis=0)
-    targets = (take.labels - mean).reshape(len(take.keys), -1)
-    weights, *_ = np.linalg.lstsq(X[take.keys], targets, rcond=RANK)
-    return np.asarray((X @ weights).reshape(len(take), *mean.shape) + mean)
-
-
-def scaled_source(take: KeyedPerformance) -> FloatArray:
-    """The source turned and scaled as the motion of the target asks, s x_p(t) R, (T, M, 3).
-
-    The rotation R and s ≥ 0 are best over all feature points and keys (Kabsch 1976, Umeyama 1991):
-    it does not matter which way is up in either.
-    """
-    source, target = (motion.reshape(-1, 3) for motion in _centred_keys(take))
-    power = float(np.sum(source**2))
-    if power == 0:
-        return np.zeros_like(take.source)
-    target_size = float(np.linalg.norm(target)) or 1.0
-    target, weights = np.sqrt(power) / target_size * target, np.ones((1, len(source)))
-    # From the best rotation but for the pull, the pull bends nothing that the motion determines.
-    first = align(source, target[None], weights, PULL)
-    motion = align(first.apply(source)[0], target[None], weights, PULL).after(first)
-    rotation = motion.rotations[0].T
-    scale = target_size / np.sqrt(power) * float(np.sum((source @ rotation) * target)) / power
-    return np.asarray(scale * take.source @ rotation)
-
-
-def scaled_points(take: KeyedPerformance) -> FloatArray:
-    """The source, each feature point times the ratio of its own motion over the keys, (T, M, 3)."""
-    source, target = _centred_keys(take)
-    motion = np.sum(source**2, axis=(0, 2))
-    product = np.sum(source * target, axis=(0, 2))
-    scale = np.divide(product, motion, out=np.zeros_like(motion), where=motion > 0)
-    return np.asarray(scale[:, None] * take.source)
 
 
 def _nearness(rest: FloatArray) -> FloatArray:
@@ -196,9 +157,3 @@ def _trusts(errors: FloatArray, keys: int) -> FloatArray:
     least = errors.min()
     weights = (errors / least) ** (-TRUST * keys) if least > 0 else np.ones_like(errors)
     return np.asarray(weights / weights.sum())
-
-
-def _centred_keys(take: KeyedPerformance) -> tuple[FloatArray, FloatArray]:
-    """Source and target of the keys less their means, each (K, M, 3)."""
-    source = take.source[take.keys]
-    return source - source.mean(axis=0), take.labels - take.labels.mean(axis=0)
