@@ -59,7 +59,7 @@ class Chart:
         self._chart.data = (self._time[self._frames], *self._curves, now)
 
     def _range(self) -> tuple[float, float]:
-        """What the chart shows, told beforehand: uPlot stumbles over the gaps around "now"."""
+        """Lowest and highest value shown; uPlot itself stumbles over the gaps around "now"."""
         values = np.concatenate(self._curves)
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         room = 0.05 * max(high - low, 1e-3)

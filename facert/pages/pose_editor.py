@@ -1,4 +1,4 @@
-"""A pose in the making: some controls are pinned, the others follow."""
+"""A pose that is being edited: some controls are pinned, the others follow."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEPT = 32  # sets of pinned controls whose completion is kept: going back to one
 
 
 class PoseEditor:
-    """A pose of which the user holds some controls.
+    """A pose of which some controls are pinned.
 
     Without a pose to begin with, the others follow by `facert.posing.completion`; from one that
     was retargeted, they are corrected with the pinned ones by `facert.posing.correction`. Without
@@ -76,8 +76,7 @@ class PoseEditor:
 
     def pin(self, control: int, value: float) -> None:
         """Hold a control at a value."""
-        self.pins[control] = value
-        self._posed = self._solve(0, 0)
+        self.pin_all({control: value})
 
     def pin_all(self, pins: Mapping[int, float]) -> None:
         """Hold some controls as well."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
 from functools import partial
 from html import escape
@@ -12,16 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from viser import Icon
 
+from facert.data.arrays import FloatArray
+from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.errors import InputError
-from facert.pages.playback import Playback
+from facert.pages.paint import skin
 from facert.pages.pose_editor import PoseEditor, slider_bounds
-from facert.pages.pose_stage import SAMPLES, PoseStage
-from facert.pages.server import complainer
+from facert.pages.server import show_errors
 from facert.pages.session import PosingSession, Trained
-from facert.pages.sliders import Pins, Sliders
-from facert.pages.timeline import FrameList, Timeline
-from facert.pages.worker import Worker
+from facert.pages.stage import ActorParts, FacePart, Stage
+from facert.pages.widgets import ButtonList, Sliders, Timeline
+from facert.pages.worker import PlayedPage, Worker
 from facert.render.faces import Face
 
 if TYPE_CHECKING:
@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 SUGGESTED = 5
+SAMPLES = 3  # other plausible poses
 LEFT, RIGHT = 330, 320  # pixels of the panels
 TRAIN, TRAINING = "Train on the labels", "Training ..."
 
 
-class PosePage:
+class PosePage(PlayedPage):
     """A character to pose, and the take that it is posed for.
 
     All that changes the pose runs in one worker. Training and suggestions, which take a second,
@@ -53,20 +54,17 @@ class PosePage:
     def __init__(
         self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None = None
     ) -> None:
-        self._server, self.session = server, session
-        self.editor = PoseEditor(session.controls, session.known)
-        self.playback = Playback(np.zeros(1) if session.take is None else session.take.time)
-        self._seed, self._clock = 0, time.perf_counter()
+        super().__init__(server, np.zeros(1) if session.take is None else session.take.time, RIGHT)
+        self.session, self.editor = session, PoseEditor(session.controls, session.known)
+        self._seed = 0
         self._drafts: dict[int, dict[int, float]] = {}  # what is pinned in frames that were left
-        self._stage = PoseStage(server, rig, session, actor)
+        self._stage = _PoseStage(server, rig, session, actor)
         self._add_sliders()
-        server.gui.main_panel.dock_right()
-        server.gui.main_panel.set_width(RIGHT)
         self._add_take()
         self._add_pose()
         self._add_learning()
-        self.worker = Worker(complainer(server), self._tick)
-        self.slow = Worker(complainer(server))
+        self.start()
+        self.slow = Worker(show_errors(server))
         self.seek(0)
         self.suggest()
 
@@ -74,10 +72,6 @@ class PosePage:
         """End what is under way."""
         self.slow.stop()
         self.worker.stop()
-
-    def seek(self, frame: int) -> None:
-        """Go to a frame, and begin with its label, or with what the model says of it."""
-        self.worker.do("seek", lambda: self._go(frame))
 
     def pin(self, control: int, value: float) -> None:
         """Hold a control; the others follow."""
@@ -113,35 +107,29 @@ class PosePage:
     def _go(self, frame: int) -> None:
         if self.editor.pins:
             self._drafts[self.playback.frame] = dict(self.editor.pins)
-        self.playback.seek(frame)
-        self._begin()
+        super()._go(frame)
 
-    def _begin(self) -> None:
-        """With what is known of the frame, and what was pinned when it was last looked at."""
+    def _show_frame(self) -> None:
+        """Begin with the frame's label or prediction, and with what was pinned there before."""
         frame = self.playback.frame
         if self.session.take is not None:
             self.editor.begin(*self.session.pose(frame))
             self.editor.pin_all(self._drafts.pop(frame, {}))
         self._show()
 
-    def _tick(self) -> None:
-        now = time.perf_counter()
-        passed, self._clock = now - self._clock, now
-        if self.playback.advance(passed):
-            self._begin()
-
     def _show(self) -> None:
         frame, editor = self.playback.frame, self.editor
         self._stage.draw(frame, editor.pose)
         self._sliders.show(editor.pose, editor.pins)
-        self._pins.show(editor.pins)
+        names = editor.controls.names
+        self._pins.show({pin: f"{names[pin]}  {value:.2f}" for pin, value in editor.pins.items()})
         self._adopt.visible, self._free.visible = False, len(editor.pins) > 1
         if self._timeline is not None:
             self._timeline.show(frame)
-        self._say(self._status, self._state(frame))
+        self._write(self._status, self._state(frame))
 
     def _state(self, frame: int) -> str:
-        """What the pose is, in a line."""
+        """The state of the pose, in a line."""
         editor, session = self.editor, self.session
         if editor.far:
             return "No known pose comes near what is pinned: the rest is a guess."
@@ -154,15 +142,15 @@ class PosePage:
             return "Neutral. Move a slider: it is pinned, and the others follow."
         if session.labelled(frame):
             return "The frame's label."
-        return "What the model says. Move what is wrong."
+        return "The model's prediction. Move what is wrong."
 
     def _save(self) -> None:
         frame = self.playback.frame
         path = self.session.save(frame, self.editor.pose)
         self.editor.learn(self.session.known)
         self._mark()
-        self._begin()
-        self._say(self._news, f"Frame {frame} saved to {escape(path.name)}.")
+        self._show_frame()
+        self._write(self._news, f"Frame {frame} saved to {escape(path.name)}.")
         self.suggest()
 
     def _train(self) -> None:
@@ -180,9 +168,9 @@ class PosePage:
         where = "" if path is None else f" {escape(path.name)} is written."
         self.editor.learn(self.session.known)
         if not self.editor.pins:
-            self._begin()
-        said = f"Learned from {trained.labels} labels in {trained.seconds:.1f} s.{moved}{where}"
-        self._say(self._news, said)
+            self._show_frame()
+        learned = f"Learned from {trained.labels} labels in {trained.seconds:.1f} s."
+        self._write(self._news, learned + moved + where)
 
     def _suggest(self) -> None:
         """In the slow worker."""
@@ -190,13 +178,13 @@ class PosePage:
             found = self.session.suggestion(SUGGESTED)
         except InputError as error:  # nearly all frames are posed
             log.debug("nothing to suggest: %s", error)
-            self.worker.do("suggested", lambda: self._places.show([]))
+            self.worker.do("suggested", lambda: self._suggested.show({}))
             return
-        places = [
-            (frame, f"frame {frame}   stands for {share:.0%}")
+        labels = {
+            frame: f"frame {frame}   stands for {share:.0%}"
             for frame, share in zip(found.frames.tolist(), found.shares.tolist(), strict=True)
-        ]
-        self.worker.do("suggested", lambda: self._places.show(places))
+        }
+        self.worker.do("suggested", lambda: self._suggested.show(labels))
 
     def _sample(self) -> None:
         self._seed += 1
@@ -225,13 +213,14 @@ class PosePage:
         self._timeline: Timeline | None = None
         if self.session.take is not None:
             self._timeline = Timeline(self._server, self.session.take, self.playback, self.seek)
-            self._places = FrameList(self._server, "Pose next", self.seek)
-            self._places.show([])
+            self._suggested = ButtonList(self._server, "Pose next", self.seek)
 
     def _add_pose(self) -> None:
         gui = self._server.gui
         self._status = gui.add_html("")
-        self._pins = Pins(self._server, self.editor.controls.names, self.let_go)
+        self._pins = ButtonList(
+            self._server, "Pinned (click to let go)", self.let_go, Icon.PINNED_OFF
+        )
         self._free = gui.add_button("Let all go", icon=Icon.PINNED_OFF, color="gray")
         neutral = gui.add_button("Start from neutral", icon=Icon.MOOD_NEUTRAL, color="gray")
         other = gui.add_button("Other plausible poses", icon=Icon.ARROWS_SHUFFLE, color="gray")
@@ -259,5 +248,50 @@ class PosePage:
         self._train_button.on_click(lambda _: self.train())
         self._mark()
 
-    def _say(self, where: GuiHtmlHandle, text: str) -> None:
+    def _write(self, where: GuiHtmlHandle, text: str) -> None:
         where.content = f'<div style="padding:4px 12px;font-size:13px">{text}</div>'
+
+
+class _PoseStage:
+    """The actor in a frame, the character as it is posed, and samples when they are asked for.
+
+    Raises
+    ------
+    InputError
+        When the rig lacks a shape for a control.
+    """
+
+    def __init__(
+        self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None
+    ) -> None:
+        self._rig, self._drivers = rig, shape_drivers(session.controls.names, rig.names)
+        self._stage = Stage(server)
+        source = None if session.take is None else session.take.source
+        self._actor = ActorParts(server, self._stage, source, actor)
+        own = skin(rig.mesh)
+        self._character = self._stage.add(FacePart(server, "character", rig.mesh, own))
+        self._samples = [
+            FacePart(server, f"other {number}", rig.mesh, own) for number in range(1, SAMPLES + 1)
+        ]
+        for part in self._samples:
+            part.shown = False
+            self._stage.add(part, row=1)
+
+    def draw(self, frame: int, pose: FloatArray) -> None:
+        """A frame of the actor, and the character's pose (P,); the samples leave."""
+        self._actor.draw(frame)
+        self._character.draw(self._vertices(pose[None])[0])
+        self.show_samples(np.empty((0, len(pose))))
+
+    def show_samples(self, poses: FloatArray) -> None:
+        """Other poses (n, P) beside the character, at most `SAMPLES`."""
+        changed = [part.shown for part in self._samples].count(True) != len(poses)
+        for part, vertices in zip(self._samples, self._vertices(poses), strict=False):
+            part.draw(vertices)
+        for number, part in enumerate(self._samples):
+            part.shown = number < len(poses)
+        if changed:
+            self._stage.arrange()
+
+    def _vertices(self, poses: FloatArray) -> FloatArray:
+        return self._rig.deform(poses @ self._drivers)

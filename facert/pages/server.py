@@ -1,4 +1,4 @@
-"""A page's server: on this machine only unless told otherwise, and quiet."""
+"""A page's server: on this machine only unless asked for more, and quiet."""
 
 from __future__ import annotations
 
@@ -22,13 +22,7 @@ _HIGHEST_PORT = 65535
 
 
 def require_viser() -> None:
-    """Check that there is something to make pages with; before anything else is imported.
-
-    Raises
-    ------
-    FacertError
-        When there is not.
-    """
+    """Check that viser is installed, before anything else is imported; FacertError if not."""
     if find_spec("viser") is None:
         raise FacertError("pages need viser: pip install 'facert[view]'")
 
@@ -64,20 +58,20 @@ def page_server(title: str, host: str = LOOPBACK, port: int = 8080) -> Iterator[
 
 
 def address(server: ViserServer) -> str:
-    """What to type into a browser."""
+    """The address to open in a browser."""
     host = server.get_host()
     shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.get_port()}"
 
 
-def complainer(server: ViserServer) -> Callable[[str], None]:
-    """What shows every visitor a line that says what went wrong."""
+def show_errors(server: ViserServer) -> Callable[[str], None]:
+    """A function that shows a line about an error to every visitor."""
 
-    def complain(text: str) -> None:
+    def show(text: str) -> None:
         for client in server.get_clients().values():
             client.add_notification("This did not work", text, color="red")
 
-    return complain
+    return show
 
 
 def wait_for_interrupt() -> None:
@@ -95,7 +89,7 @@ def wait_for_interrupt() -> None:
 
 
 def _require_address(host: str, port: int) -> None:
-    """Refuse what the server would try again and again."""
+    """Check host and port: the server would try wrong ones again and again."""
     if not 0 <= port <= _HIGHEST_PORT:
         raise InputError("--port", f"0 to {_HIGHEST_PORT}", f"{port}", "Choose another.")
     try:

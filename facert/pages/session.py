@@ -24,7 +24,7 @@ ENDING = ".posed.h5"
 
 @dataclass(frozen=True)
 class Trained:
-    """What training came to.
+    """The outcome of training.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class PosingSession:
     take : Take, optional
         What was recorded; its poses are the first labels, unless they were predicted by a model.
     model : Retargeter, optional
-        Tells a pose for every frame, and what poses the character makes.
+        Predicts a pose for every frame, and holds the poses that the character makes.
     output : Path, optional
         Where `save` writes the take with its labels. The model of `train` is beside it.
 
@@ -96,7 +96,7 @@ class PosingSession:
         return KnownPoses(poses, spans if limits is None else limits)
 
     def pose(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
-        """A frame's label, else what the model says of it, with its standard deviation."""
+        """The label of a frame, else the prediction with its standard deviation, else None."""
         if self.labelled(frame) and self.take is not None and self.take.params is not None:
             return self.take.params[frame], None
         return self._predicted(frame)

@@ -7,14 +7,16 @@ with it, so that all parts are seen from the same side: their cameras are linked
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
+from facert.data.take import Source
 from facert.mesh.normals import vertex_normals
-from facert.pages.paint import LEVELS, MOST, Paint
+from facert.pages.paint import LEVELS, MOST, Paint, skin
+from facert.render.faces import Face
 from facert.render.shade import frame_mesh
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ HEIGHT = 1.3  # of a row
 CENTRE = np.array([0.0, -0.03, 0.0])  # of the first row
 FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 GAP = 0.08  # between two parts; each is 1 high or wide
-ASPECT = 1.2  # of the picture, width over height, until a browser tells
+ASPECT = 1.2  # of the picture, width over height, until a browser reports it
 APRON = 0.004  # how deep, see `ColourLayer`
 _POINT = 0.022
 _TURNED = 1e-3  # of the line across the view: less is not worth a message
@@ -69,9 +71,9 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ColourLayer:
-    """The part of a mesh that has one colour, with an apron: the triangles around it.
+    """The triangles of a mesh that have one colour, with an apron: the triangles around them.
 
-    The browser computes a vertex's normal from the piece's triangles alone: without the apron
+    The browser computes a vertex's normal from the layer's triangles alone: without the apron
     there would be a seam. The apron is hidden a little below the neighbours' own triangles.
 
     Parameters
@@ -90,7 +92,7 @@ class ColourLayer:
 
 
 def colour_layer(faces: IntArray, chosen: BoolArray) -> ColourLayer:
-    """The piece of chosen triangles, (F,), of a mesh (F, 3)."""
+    """The layer of chosen triangles, (F,), of a mesh (F, 3)."""
     inside = np.zeros(int(faces.max(initial=-1)) + 1, dtype=np.bool_)
     inside[faces[chosen]] = True
     triangles = faces[inside[faces].any(axis=1)]
@@ -115,7 +117,7 @@ class FacePart(Part):
         super().__init__(server, label, mesh.vertices)
         self._faces, self._own = mesh.faces, own
         self._worn: Paint | None = None
-        self._pieces: list[ColourLayer] = []
+        self._layers: list[ColourLayer] = []
         self._meshes = [
             server.scene.add_mesh_simple(
                 f"/{label}/colour{index}",
@@ -139,9 +141,9 @@ class FacePart(Part):
         sunk = placed - APRON * vertex_normals(placed, self._faces)
         with self._server.atomic():
             self._wear(paint or self._own)
-            for mesh, piece in zip(self._meshes, self._pieces, strict=False):
-                if len(piece.faces):
-                    chosen = np.where(piece.own[:, None], placed[piece.used], sunk[piece.used])
+            for mesh, layer in zip(self._meshes, self._layers, strict=False):
+                if len(layer.faces):
+                    chosen = np.where(layer.own[:, None], placed[layer.used], sunk[layer.used])
                     mesh.vertices = chosen.astype(np.float32)
 
     def _wear(self, paint: Paint) -> None:
@@ -149,14 +151,14 @@ class FacePart(Part):
         if self._worn is paint:
             return
         self._worn = paint
-        self._pieces = [
+        self._layers = [
             colour_layer(self._faces, paint.paint == k) for k in range(len(paint.palette))
         ]
         for index, mesh in enumerate(self._meshes):
-            there = index < len(self._pieces) and len(self._pieces[index].faces) > 0
+            there = index < len(self._layers) and len(self._layers[index].faces) > 0
             mesh.visible = there
             if there:
-                mesh.faces = self._pieces[index].faces.astype(np.uint32)
+                mesh.faces = self._layers[index].faces.astype(np.uint32)
                 red, green, blue = np.rint(255 * paint.palette[index]).astype(int).tolist()
                 mesh.color = (red, green, blue)
 
@@ -185,8 +187,11 @@ class MarkerPart(Part):
             self._points.points = there.astype(np.float32)
 
 
+AnyPart = TypeVar("AnyPart", bound=Part)
+
+
 class Stage:
-    """Where the parts stand."""
+    """The places of the parts, and the cameras that look at them."""
 
     def __init__(self, server: ViserServer) -> None:
         self._server = server
@@ -199,12 +204,13 @@ class Stage:
         _light(server)
         server.on_client_connect(self._link)
 
-    def add(self, part: Part, row: int = 0) -> None:
-        """Put a part to the right of the others in its row; the first row is the highest."""
+    def add(self, part: AnyPart, row: int = 0) -> AnyPart:
+        """Put a part to the right of the others in its row, the first row highest; return it."""
         while len(self._rows) <= row:
             self._rows.append([])
         self._rows[row].append(part)
         self.arrange()
+        return part
 
     def arrange(self) -> None:
         """Line up the parts that are shown, and let every camera see them all."""
@@ -256,6 +262,34 @@ class Stage:
         if length > 0.1 and np.abs(right / length - self._right).max() > _TURNED:
             self._right = right / length
             self._line_up()
+
+
+class ActorParts:
+    """The recording on the stage: its markers, and the actor's face where one is given."""
+
+    def __init__(
+        self, server: ViserServer, stage: Stage, source: Source | None, face: Face | None
+    ) -> None:
+        self._source, self._face = source, face
+        self._markers: MarkerPart | None = None
+        if source is not None and source.kind == "markers":
+            self._markers = stage.add(MarkerPart(server, "markers", source.values))
+        self._mesh: FacePart | None = None
+        if face is not None:
+            self._mesh = stage.add(face_part(server, face))
+
+    def draw(self, frame: int) -> None:
+        """Show a frame."""
+        if self._source is not None and self._markers is not None:
+            self._markers.draw(self._source.values[frame])
+        if self._face is not None and self._mesh is not None:
+            self._mesh.draw(self._face.motion.fetch(np.array([frame]))[0])
+
+
+def face_part(server: ViserServer, face: Face, own: Paint | None = None) -> FacePart:
+    """The part of a face, in its own colours (see `skin`) unless others are given."""
+    neutral = face.motion.neutral
+    return FacePart(server, face.label, neutral, own or skin(neutral))
 
 
 def _light(server: ViserServer) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import shape_drivers
 from facert.data.rig import Rig
+from facert.data.shared_controls import require_shared, shared_controls
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.evaluation.metrics import compare, vertex_errors, vertex_gram
+from facert.evaluation.metrics import vertex_errors, vertex_gram
 from facert.pages.paint import Scale
 from facert.render.faces import Face, posed_face
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from facert.retarget.retargeter import Retargeter
 
 APART = 0.5  # seconds between two frames that are listed
-_LOOKED_AT = 48  # frames that tell how far a scale goes
+_LOOKED_AT = 48  # frames that show how far a scale goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +54,10 @@ class Performance:
     def __post_init__(self) -> None:
         if self.truth is None:
             return
-        if len(self.truth) != len(self.take):
-            expected, found = f"{len(self.take)} frames", f"{len(self.truth)}"
-            raise InputError("--truth", expected, found, "Give the truth of this take.")
-        if compare(self.truth, self.take) is None:
-            expected, found = "poses of the take's controls", "others, or none"
-            raise InputError("--truth", expected, found, "Give the truth of this take.")
+        fix = "Give the truth of this take."
+        shared = require_shared(self.truth, self.take, fix)
+        if shared.of_truth or shared.of_result:
+            raise InputError("--truth", "poses of the take's controls", "others, or none", fix)
 
     @cached_property
     def face(self) -> Face | None:
@@ -75,20 +74,16 @@ class Performance:
         return posed_face(self.truth, self.rig, "truth")
 
     @cached_property
-    def doubt(self) -> FloatArray | None:
-        """Standard deviation of the pose, root mean square over controls, (T,)."""
+    def std(self) -> FloatArray | None:
+        """Predicted standard deviation of the pose, root mean square over controls, (T,)."""
         std = self.take.std
         return None if std is None else np.asarray(np.sqrt(np.mean(std**2, axis=1)))
 
     @cached_property
     def true_params(self) -> FloatArray | None:
         """The true poses in the order of the take's controls, (T, P)."""
-        if self.truth is None or self.truth.params is None:
-            return None
-        assert self.truth.controls is not None  # poses come with controls
-        assert self.take.controls is not None
-        columns = [self.truth.controls.names.index(name) for name in self.take.controls.names]
-        return np.asarray(self.truth.params[:, columns])
+        shared = None if self.truth is None else shared_controls(self.truth, self.take)
+        return None if shared is None else shared.truth.params
 
     @cached_property
     def errors(self) -> FloatArray | None:
@@ -112,8 +107,8 @@ class Performance:
         off = self.face.motion.fetch(rows)[0] - self.true_face.motion.fetch(rows)[0]
         return np.asarray(np.linalg.norm(off, axis=1))
 
-    def vertex_doubt(self, frame: int) -> FloatArray | None:
-        """Standard deviation of each vertex in a frame, (V,), controls taken as independent."""
+    def vertex_std(self, frame: int) -> FloatArray | None:
+        """Predicted standard deviation of each vertex, (V,), with independent controls."""
         if self._squared_shapes is None or self.take.std is None:
             return None
         return np.asarray(np.sqrt(self.take.std[frame] ** 2 @ self._squared_shapes))
@@ -128,10 +123,10 @@ class Performance:
         return np.asarray(np.sum(shapes**2, axis=2))
 
     def scale(self) -> Scale:
-        """Colours for what `vertex_errors`, else `vertex_doubt`, tell."""
+        """The scale of colours for `vertex_errors`, else for `vertex_std`."""
         units = self.rig.units if self.rig is not None else ""
         some = np.unique(np.linspace(0, len(self.take) - 1, _LOOKED_AT).astype(int)).tolist()
-        measure = self.vertex_errors if self.true_face is not None else self.vertex_doubt
+        measure = self.vertex_errors if self.true_face is not None else self.vertex_std
         found = [values for frame in some if (values := measure(frame)) is not None]
         values = np.array(found)
         return Scale.of(values[np.isfinite(values)], units)

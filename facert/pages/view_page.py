@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +9,10 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.pages.charts import Chart
 from facert.pages.paint import Paint, Scale, skin
-from facert.pages.playback import Playback
-from facert.pages.server import complainer
-from facert.pages.stage import FacePart, MarkerPart, Stage
-from facert.pages.timeline import FrameList, Timeline
+from facert.pages.stage import ActorParts, FacePart, Stage, face_part
 from facert.pages.view_data import Performance, highest
-from facert.pages.worker import Worker
+from facert.pages.widgets import ButtonList, Timeline
+from facert.pages.worker import PlayedPage
 from facert.render.faces import Face
 from facert.render.plots import most_varying
 
@@ -24,11 +21,12 @@ if TYPE_CHECKING:
 
 LISTED = 5  # frames worth a look
 CHARTS = 3  # to begin with
-OWN, ERROR, DOUBT = "its own", "error", "uncertainty"
+WIDTH = 340  # pixels of the panel
+OWN, ERROR, UNCERTAIN = "its own", "error", "uncertainty"
 SPEEDS = {"¼": 0.25, "½": 0.5, "1": 1.0, "2": 2.0}
 
 
-class ViewPage:
+class ViewPage(PlayedPage):
     """A performance on a page.
 
     Parameters
@@ -42,41 +40,24 @@ class ViewPage:
     def __init__(
         self, server: ViserServer, performance: Performance, actor: Face | None = None
     ) -> None:
-        self._server, self.performance = server, performance
-        self.playback = Playback(performance.take.time)
-        self._clock = time.perf_counter()
+        super().__init__(server, performance.take.time, WIDTH)
+        self.performance = performance
         self._faces = _Faces(server, performance, actor)
-        server.gui.main_panel.dock_right()
-        server.gui.main_panel.set_width(340)
         self._timeline = Timeline(server, performance.take, self.playback, self.seek)
         self._timeline.mark(performance.key_poses)
         self._add_colours()
         self._add_places()
         self._charts: dict[int, Chart] = {}
         self._add_curves()
-        self._show()
-        self.worker = Worker(complainer(server), self._tick)
+        self._show_frame()
+        self.start()
 
-    def seek(self, frame: int) -> None:
-        """Go to a frame."""
-        self.worker.do("seek", lambda: self._go(frame))
-
-    def _go(self, frame: int) -> None:
-        self.playback.seek(frame)
-        self._show()
-
-    def _show(self) -> None:
+    def _show_frame(self) -> None:
         frame = self.playback.frame
         self._faces.draw(frame, self._colours.value)
         self._timeline.show(frame)
         for chart in self._charts.values():
             chart.move(frame)
-
-    def _tick(self) -> None:
-        now = time.perf_counter()
-        passed, self._clock = now - self._clock, now
-        if self.playback.advance(passed):
-            self._show()
 
     def _add_colours(self) -> None:
         server, kinds = self._server, self._faces.colours
@@ -87,7 +68,7 @@ class ViewPage:
 
         def choose(_: object) -> None:
             legend.visible = self._colours.value != OWN
-            self.worker.do("colours", self._show)
+            self.worker.do("colours", self._show_frame)
 
         self._colours.on_update(choose)
 
@@ -96,17 +77,17 @@ class ViewPage:
         performance, controls = self.performance, "of a control"
         units = performance.rig.units if performance.rig is not None else controls
         lists = (
-            ("Most uncertain", performance.doubt, "±", controls),
+            ("Most uncertain", performance.std, "±", controls),
             ("Largest errors", performance.errors, "off by", units),
         )
         for title, values, word, unit in lists:
             frames = [] if values is None else highest(values, performance.take.time, LISTED)
-            FrameList(self._server, title, self.seek).show(
-                [
-                    (f, f"frame {f}   {word} {values[f]:.2g} {unit}")
+            ButtonList(self._server, title, self.seek).show(
+                {
+                    f: f"frame {f}   {word} {values[f]:.2g} {unit}"
                     for f in frames
                     if values is not None
-                ]
+                }
             )
 
     def _add_curves(self) -> None:
@@ -143,39 +124,28 @@ class _Faces:
     """Everything on the stage."""
 
     def __init__(self, server: ViserServer, performance: Performance, actor: Face | None) -> None:
-        self._server, self._performance = server, performance
+        self._performance = performance
         self.scale: Scale = performance.scale()
-        self._stage, source = Stage(server), performance.take.source
-        self._markers: MarkerPart | None = None
-        if source.kind == "markers":
-            self._markers = MarkerPart(server, "markers", source.values)
-            self._stage.add(self._markers)
+        stage = Stage(server)
+        self._actor = ActorParts(server, stage, performance.take.source, actor)
         self._faces: list[tuple[Face, FacePart]] = []
-        if actor is not None:
-            self._add(actor, skin(actor.motion.neutral))
         if performance.face is not None:
             own = skin(performance.face.motion.neutral)
             for face in filter(None, (performance.face, performance.true_face)):
-                self._add(face, own)
-
-    def _add(self, face: Face, own: Paint) -> None:
-        part = FacePart(self._server, face.label, face.motion.neutral, own)
-        self._faces.append((face, part))
-        self._stage.add(part)
+                self._faces.append((face, stage.add(face_part(server, face, own))))
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """What the character's colours can tell."""
+        """What the character's colours can show."""
         performance = self._performance
         error = (ERROR,) if performance.true_face is not None else ()
-        doubtful = performance.face is not None and performance.doubt is not None
-        return (OWN, *error, *((DOUBT,) if doubtful else ()))
+        with_std = performance.face is not None and performance.std is not None
+        return (OWN, *error, *((UNCERTAIN,) if with_std else ()))
 
     def draw(self, frame: int, colours: str) -> None:
         """A frame, with the character in some of `colours`."""
         rows: IntArray = np.array([frame])
-        if self._markers is not None:
-            self._markers.draw(self._performance.take.source.values[frame])
+        self._actor.draw(frame)
         for face, part in self._faces:
             vertices = face.motion.fetch(rows)[0]
             paint = self._paint(frame, colours) if face is self._performance.face else None
@@ -185,8 +155,8 @@ class _Faces:
         values: FloatArray | None = None
         if colours == ERROR:
             values = self._performance.vertex_errors(frame)
-        elif colours == DOUBT:
-            values = self._performance.vertex_doubt(frame)
+        elif colours == UNCERTAIN:
+            values = self._performance.vertex_std(frame)
         face = self._performance.face
         if values is None or face is None or not np.isfinite(values).all():
             return None

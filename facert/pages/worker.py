@@ -1,12 +1,26 @@
-"""One thread that does everything on a page, in order: no lock is needed anywhere else."""
+"""What drives a page: one thread for all its tasks, and the frame that is shown.
+
+As the thread does everything in order, no lock is needed anywhere else.
+"""
 
 from __future__ import annotations
 
 import logging
+import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Condition, Thread
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from facert.data.arrays import FloatArray
 from facert.errors import FacertError
+from facert.pages.server import show_errors
+
+if TYPE_CHECKING:
+    from viser import ViserServer
 
 log = logging.getLogger(__name__)
 
@@ -14,14 +28,14 @@ Task = Callable[[], None]
 
 
 class Worker:
-    """Does tasks one after the other; of several that wait under one key, only the newest.
+    """A thread for tasks, one after the other; of several that wait under one key, the newest.
 
     A slider that is dragged sends more values than can be drawn: those in between are left out.
 
     Parameters
     ----------
     complain : callable
-        Told in a line what went wrong in a task.
+        Called with a line about what went wrong in a task.
     tick : callable, optional
         Called about every `pause` seconds between the tasks, with nothing waiting.
     pause : float
@@ -47,7 +61,7 @@ class Worker:
             self._changed.notify_all()
 
     def finish(self, seconds: float = 10.0) -> bool:
-        """Wait until nothing is left to do; whether it came to that in time."""
+        """Wait until nothing is left to do; return whether that was in time."""
         with self._changed:
             return self._changed.wait_for(lambda: self._idle and not self._waiting, seconds)
 
@@ -79,10 +93,85 @@ class Worker:
                 return None
             self._idle = False
             if not self._waiting:
-                return self._tick or _nothing
-            key = next(iter(self._waiting))
-            return self._waiting.pop(key)
+                return self._tick  # after a pause
+            return self._waiting.pop(next(iter(self._waiting)))
 
 
-def _nothing() -> None:
-    """What is to be done when nothing is."""
+@dataclass
+class Playback:
+    """The frame that is shown.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        Seconds, rising.
+    frame : int
+    playing : bool
+    speed : float
+        Seconds of the performance a second.
+    """
+
+    time: FloatArray
+    frame: int = 0
+    playing: bool = False
+    speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        self._moment = float(self.time[self.frame])
+
+    def seek(self, frame: int) -> None:
+        """Go to a frame; the nearest one that there is."""
+        self.frame = min(max(frame, 0), len(self.time) - 1)
+        self._moment = float(self.time[self.frame])
+
+    def advance(self, seconds: float) -> bool:
+        """Let time pass, from the last frame on to the first; return whether the frame changed."""
+        if not self.playing:
+            return False
+        before, self._moment = self.frame, self._moment + self.speed * seconds
+        if self._moment > self.time[-1]:
+            self._moment = float(self.time[0])
+        # The last frame that has begun.
+        self.frame = max(int(np.searchsorted(self.time, self._moment, side="right")) - 1, 0)
+        return self.frame != before
+
+
+class PlayedPage(ABC):
+    """A page that shows one frame of a performance at a time.
+
+    Parameters
+    ----------
+    server : ViserServer
+    time : array, shape (T,)
+        Of the frames.
+    width : int
+        Of the panel at the right, in pixels.
+    """
+
+    def __init__(self, server: ViserServer, time: FloatArray, width: int) -> None:
+        self._server, self.playback = server, Playback(time)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(width)
+
+    def start(self) -> None:
+        """Begin with the tasks and the clock, when everything is on the page."""
+        self._clock = time.perf_counter()
+        self.worker = Worker(show_errors(self._server), self._tick)
+
+    def seek(self, frame: int) -> None:
+        """Go to a frame."""
+        self.worker.do("seek", lambda: self._go(frame))
+
+    def _go(self, frame: int) -> None:
+        self.playback.seek(frame)
+        self._show_frame()
+
+    def _tick(self) -> None:
+        now = time.perf_counter()
+        passed, self._clock = now - self._clock, now
+        if self.playback.advance(passed):
+            self._show_frame()
+
+    @abstractmethod
+    def _show_frame(self) -> None:
+        """Show the frame that `playback` has come to."""

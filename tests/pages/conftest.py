@@ -94,7 +94,7 @@ def visit(_browser) -> Callable[[str], Iterator[Visit]]:
         seen = Visit(context.new_page())
         seen.page.on("pageerror", lambda error: seen.errors.append(str(error)))
         seen.page.on(
-            "console", lambda said: seen.errors.append(said.text) if said.type == "error" else None
+            "console", lambda line: seen.errors.append(line.text) if line.type == "error" else None
         )
         for event in ("request", "websocket"):
             seen.page.on(event, lambda asked: seen.hosts.add(urlsplit(asked.url).hostname or ""))

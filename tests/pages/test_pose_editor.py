@@ -27,7 +27,7 @@ def test_the_others_follow_as_pose_completion_has_it(editor, make_take) -> None:
     np.testing.assert_allclose(editor.std, expected.std)
 
 
-def test_what_is_pinned_stays_exactly_and_has_no_doubt(editor) -> None:
+def test_what_is_pinned_stays_exactly_and_has_no_variance(editor) -> None:
     editor.pin(1, 0.123)
     editor.pin(3, 0.05)
     assert editor.pose[[1, 3]].tolist() == [0.123, 0.05]

@@ -48,15 +48,15 @@ def test_the_truth_may_name_its_controls_in_another_order(truth, result, rig) ->
     np.testing.assert_allclose(one.vertex_errors(5), other.vertex_errors(5))
 
 
-def test_doubt_of_one_control_moves_its_shape(truth, rig) -> None:
+def test_the_std_of_one_control_moves_its_shape(truth, rig) -> None:
     std = np.zeros((60, 4))
     std[7, 2] = 0.5
     performance = Performance(replace(truth, std=std), truth.labels[:0], rig)
     np.testing.assert_allclose(
-        performance.vertex_doubt(7), 0.5 * np.linalg.norm(rig.shapes[2], axis=1)
+        performance.vertex_std(7), 0.5 * np.linalg.norm(rig.shapes[2], axis=1)
     )
-    assert not performance.vertex_doubt(8).any()
-    assert performance.doubt[7] == pytest.approx(0.25)
+    assert not performance.vertex_std(8).any()
+    assert performance.std[7] == pytest.approx(0.25)
 
 
 def test_without_rig_or_poses_there_are_no_faces(make_take, rig) -> None:

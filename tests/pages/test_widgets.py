@@ -1,5 +1,5 @@
 from facert.data.names import ARKIT_SHAPES, control_groups
-from facert.pages.sliders import UNFOLDED, unfolded_groups
+from facert.pages.widgets import UNFOLDED, unfolded_groups
 
 
 def test_of_the_standard_shapes_all_groups_are_open():
