@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import facert
@@ -56,6 +57,10 @@ def test_no_import_runs_upwards() -> None:
         if other != "facert" and floor(other) < floor(module)
     ]
     assert not upwards
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    TopologicalSorter(IMPORTS).prepare()  # its error names the circle
 
 
 def test_the_mathematics_knows_nothing_of_files() -> None:
