@@ -26,8 +26,8 @@ This page is written by `make docs`, from the docstrings.
 OTHERS = {
     "facert.posing.suggested_frames": ("Suggestion",),
     "facert.posing.completed_pose": ("CompletedPose",),
-    "facert.retarget.options": ("RetargetOptions",),
-    "facert.retarget.adjustments": ("Adjustments",),
+    "facert.preprocess.clean_source": ("SourceOptions",),
+    "facert.retarget.options": ("RetargetOptions", "Adjustments"),
     "facert.retarget.model": ("TrainedModel",),
     "facert.retarget.stream": ("RetargetStream", "Streamed"),
 }

@@ -1,4 +1,4 @@
-"""Which markers or weights a model knows, and where a source has them."""
+"""The markers or weights that a model knows, and where a source has them."""
 
 from __future__ import annotations
 
@@ -17,57 +17,39 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Where a source has what a model knows.
+class SourceColumns:
+    """Where the numbers of a source's frames have the columns that a model knows.
 
     Parameters
     ----------
-    theirs, ours : array of int, shape (k,)
-        Indices of the same names in the source and in the model.
-    count : int
-        How many names the model has.
+    names : tuple of str
+        Of the model.
+    index : array of int, shape (d_x,)
+        Of each column among the numbers of a frame; any for those that the source lacks.
+    absent : array of int, shape (a,)
+        The columns that it lacks.
     """
 
-    theirs: IntArray
-    ours: IntArray
-    count: int
+    names: tuple[str, ...]
+    index: IntArray
+    absent: IntArray
 
-    def pick(self, values: FloatArray) -> FloatArray:
-        """Values (T, theirs, ...) in the model's order, NaN where the source has none."""
-        picked = np.full((len(values), self.count, *values.shape[2:]), np.nan)
-        picked[:, self.ours] = values[:, self.theirs]
+    def pick(self, X: FloatArray) -> FloatArray:
+        """Frames (T, d), or one (d,), in the model's order; NaN in absent columns."""
+        picked = X.take(self.index, axis=-1)
+        if len(self.absent):
+            picked[..., self.absent] = np.nan
         return picked
 
-
-class FramePicker:
-    """`Places.pick` for single frames, as flat rows.
-
-    Parameters
-    ----------
-    places : Places
-    names : int
-        How many the source has.
-    numbers : int
-        Of each: 3 for a marker, 1 for a weight.
-    """
-
-    def __init__(self, places: Places, names: int, numbers: int) -> None:
-        nothing = names
-        theirs = np.full(places.count, nothing)
-        theirs[places.ours] = places.theirs
-        self._index = (theirs[:, None] * numbers + np.arange(numbers)).ravel()
-        self._padded = np.full((names + 1) * numbers, np.nan)
-        self._own = self._padded[: names * numbers]
-
-    def pick(self, values: FloatArray) -> FloatArray:
-        """Values (names, ...) in the model's order, (d_x,); NaN where the source has none."""
-        self._own[:] = values.ravel()
-        return self._padded.take(self._index)
+    def arrange(self, source: Source) -> Source:
+        """The source with the model's markers or weights, in their order."""
+        X = self.pick(source.matrix)
+        return Source(X.reshape(len(X), len(self.names), *source.values.shape[2:]), self.names)
 
 
 @dataclass(frozen=True)
 class SourceLayout:
-    """What a model takes.
+    """The markers or weights that a model takes, in its order.
 
     Parameters
     ----------
@@ -78,8 +60,13 @@ class SourceLayout:
     kind: SourceKind
     names: tuple[str, ...]
 
-    def places(self, names: Sequence[str]) -> Places:
-        """Where a source with these names has the model's.
+    @property
+    def width(self) -> int:
+        """Numbers of each marker or weight, 3 or 1."""
+        return 3 if self.kind == "markers" else 1
+
+    def columns(self, names: Sequence[str]) -> SourceColumns:
+        """Where a source with these names has the model's columns.
 
         A marker that the source lacks is one that was not observed: the job goes on, with a
         warning. Where it has unknown names instead, or lacks most, it is misspelt or another set.
@@ -94,14 +81,20 @@ class SourceLayout:
         present = [name for name in self.names if index.find(name) is not None]
         extra = len(names) - len(present)
         if absent and (extra or len(absent) > len(present)):
-            match(absent, names, "/source/names")  # tells which, and the nearest name
-        theirs = match(present, names, "/source/names")
+            match(absent, names, "/source/names")  # names which, and the nearest name
         if absent:
             log.warning("taken as not observed, as the take lacks them: %s", ", ".join(absent))
         if extra:
             log.info("%d names of the source are not in the model: passed over", extra)
-        ours = [self.names.index(name) for name in present]
-        return Places(np.asarray(theirs), np.array(ours, dtype=np.int64), len(self.names))
+        seen = np.isin(self.names, present)
+        places = np.zeros(len(self.names), dtype=np.int64)
+        places[seen] = match(present, names, "/source/names")
+        numbers = np.arange(self.width)
+        return SourceColumns(
+            self.names,
+            (places[:, None] * self.width + numbers).ravel(),
+            np.flatnonzero(np.repeat(~seen, self.width)),
+        )
 
     def arrange(self, source: Source) -> Source:
         """A source in the model's order.
@@ -109,10 +102,10 @@ class SourceLayout:
         Raises
         ------
         InputError
-            When it is of another kind, or as in `places`.
+            When it is of another kind, or as in `columns`.
         """
         self.require_kind(source.kind)
-        return Source(self.places(source.names).pick(source.values), self.names)
+        return self.columns(source.names).arrange(source)
 
     def require_kind(self, kind: SourceKind) -> None:
         """Refuse a source of another kind."""

@@ -13,7 +13,6 @@ from facert.data.take import Controls, SourceKind, Take
 from facert.methods.base import Method
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
-from facert.retarget.adjustments import Adjustments
 from facert.settings import Settings
 
 
@@ -60,18 +59,8 @@ class TrainedModel:
     motion: Motion | None = None
     labelled: FloatArray | None = None
 
-    def finished(
-        self, Y: FloatArray, std: FloatArray | None, adjustments: Adjustments
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """Parameters and their standard deviation from normalised poses, (T, P) each."""
-        params = self.target_units.undo(Y)
-        if self.bounds is not None:
-            params = np.clip(params, *self.bounds.T)
-        spread = None if std is None else std * self.target_units.scale * np.abs(adjustments.gain)
-        return adjustments.apply(params), spread
-
     def without_known(self, take: Take) -> Take:
-        """The take without the poses that this was trained on: what is left tells the error."""
+        """The take without the poses that this was trained on, for an error on unseen ones."""
         if self.poses is None or take.params is None or take.controls is None:
             return take
         if set(take.controls.names) != set(self.controls.names):

@@ -1,44 +1,170 @@
-"""How a source is treated before it is mapped, and controls after."""
+"""How a source is treated before it is mapped, and what is changed about single controls after."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.data.names import fitting, instead_of
+from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.retarget.adjustments import Adjustments
+from facert.preprocess.clean_source import SourceOptions
+
+LARGEST = 1e6
+"""Beyond, a gain or a limit is a slip of the pen."""
+ENTRIES = ("gain", "limits", "smoothing")
 
 
-@dataclass(frozen=True)
-class RetargetOptions:
-    """What a person may choose for each take, whatever the model.
+@dataclass(frozen=True, eq=False)
+class Adjustments:
+    """For every control of a character.
 
     Parameters
     ----------
-    detect : bool
-        Take frozen, swapped and otherwise bad markers as not observed.
-    smooth : bool
-        Take noise out, and fill gaps, by what neighbouring frames tell.
-    sigma : float, optional
-        Standard deviation of the capture noise, in the take's units; by default estimated from the
-        take; a live stream begins with that of the training take and measures its own.
-    neutral : sequence of int, optional
-        Frames in which the actor rests; see `facert.preprocess.neutral`.
+    gain : array, shape (P,)
+        Values are multiplied by it.
+    limits : array, shape (P, 2)
+        Then clipped to these; infinite where nothing is clipped.
+    smoothing : array, shape (P,)
+        From 0, a control follows the measured source, to 1, it follows the cleaned one.
+    """
+
+    gain: FloatArray
+    limits: FloatArray
+    smoothing: FloatArray
+
+    @classmethod
+    def none(cls, controls: int) -> Adjustments:
+        """That change nothing."""
+        return cls(np.ones(controls), np.tile([-np.inf, np.inf], (controls, 1)), np.ones(controls))
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], names: Sequence[str]) -> Adjustments:
+        """From a table for each control, as in a TOML file.
+
+        Parameters
+        ----------
+        tables : mapping
+            ``{"jawOpen": {"gain": 1.1, "limits": [0.0, 0.9], "smoothing": 0.5}}``; a name may
+            have wildcards, ``"eyeBlink*"``. What a later table says of a control holds.
+        names : sequence of str
+            Of the character's controls.
+
+        Raises
+        ------
+        InputError
+            For unknown names or entries, and values that make no sense.
+        """
+        made = cls.none(len(names))
+        for name, table in tables.items():
+            if not isinstance(table, Mapping):
+                raise InputError(name, "a table such as [jawOpen]", repr(table), "Write a table.")
+            unknown = [entry for entry in table if entry not in ENTRIES]
+            if unknown:
+                expected = "one of " + ", ".join(ENTRIES)
+                raise InputError(f"{name}.{unknown[0]}", expected, "another entry", "Remove it.")
+            columns = _columns(name, names)
+            if "gain" in table:
+                made.gain[columns] = _number(name, table, "gain", -LARGEST, LARGEST)
+            if "limits" in table:
+                made.limits[columns] = _limits(name, table)
+            if "smoothing" in table:
+                made.smoothing[columns] = _number(name, table, "smoothing", 0.0, 1.0)
+        return made
+
+    @property
+    def smooth_all(self) -> bool:
+        """Whether every control follows the cleaned source alone."""
+        return bool((self.smoothing == 1.0).all())
+
+    def mixed(self, smooth: FloatArray, rough: FloatArray) -> FloatArray:
+        """What follows the cleaned source and what follows the measured one, (T, P) each."""
+        return np.asarray(self.smoothing * smooth + (1.0 - self.smoothing) * rough)
+
+
+@dataclass(frozen=True)
+class RetargetOptions(SourceOptions):
+    """What a person may choose for each take, whatever the model: `SourceOptions`, and controls.
+
+    Parameters
+    ----------
     adjustments : Adjustments, optional
         Of single controls.
     """
 
-    detect: bool = True
-    smooth: bool = True
-    sigma: float | None = None
-    neutral: Sequence[int] | None = None
     adjustments: Adjustments | None = None
-
-    def __post_init__(self) -> None:
-        if self.sigma is not None and not 0.0 <= self.sigma < math.inf:
-            raise InputError("sigma", "a number from 0", repr(self.sigma), "Change it.")
 
 
 AS_IT_IS = RetargetOptions(detect=False, smooth=False)
 """Every frame on its own, and every number believed."""
+
+
+class PoseScale:
+    """From normalised poses to a character's controls, of one frame or of many.
+
+    A pose is brought to the controls' units, clipped to the model's bounds, multiplied by the gain
+    and clipped to the limits; with the bounds times the gain, that is one product, one sum and one
+    clip.
+
+    Parameters
+    ----------
+    units : Normalisation
+        Of the poses.
+    bounds : array, shape (P, 2), or None
+        What poses are clipped to.
+    adjustments : Adjustments
+    """
+
+    def __init__(
+        self, units: Normalisation, bounds: FloatArray | None, adjustments: Adjustments
+    ) -> None:
+        gain = adjustments.gain
+        self._scale, self._offset = units.scale * gain, units.mean * gain
+        self._std_scale = units.scale * np.abs(gain)
+        ends = np.tile([[-np.inf], [np.inf]], len(gain)) if bounds is None else bounds.T
+        moved = np.where(gain == 0.0, 0.0, ends * np.where(gain == 0.0, 1.0, gain))  # 0 inf is NaN
+        self._low, self._high = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
+
+    def params(self, Y: FloatArray) -> FloatArray:
+        """Values of the controls from normalised poses, (T, P) or (P,)."""
+        params = Y * self._scale
+        params += self._offset
+        np.maximum(params, self._low, out=params)
+        np.minimum(params, self._high, out=params)
+        return params
+
+    def std(self, std: FloatArray | None) -> FloatArray | None:
+        """Their standard deviation from that of normalised poses, (T, P) or (P,)."""
+        return None if std is None else std * self._std_scale
+
+
+def _columns(pattern: str, names: Sequence[str]) -> list[int]:
+    """The controls that a name, or a name with wildcards, stands for."""
+    found = fitting(pattern, names)
+    if not found:
+        meant = instead_of(pattern, names)
+        fix = f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
+        raise InputError(pattern, "a control, or a pattern that some fit", "none", fix)
+    return found
+
+
+def _number(name: str, table: Mapping[str, Any], entry: str, low: float, high: float) -> float:
+    value = table[entry]
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        expected = f"a number from {low:g} to {high:g}"
+        raise InputError(f"{name}.{entry}", expected, repr(value), "Change it.")
+    return float(value)
+
+
+def _limits(name: str, table: Mapping[str, Any]) -> tuple[float, float]:
+    value = table["limits"]
+    numbers = isinstance(value, list) and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) <= LARGEST for v in value
+    )
+    if not numbers or len(value) != 2 or not value[0] <= value[1]:
+        raise InputError(f"{name}.limits", "[low, high]", repr(value), "For instance [0.0, 1.0].")
+    return float(value[0]), float(value[1])

@@ -1,7 +1,8 @@
 """A trained retargeter: from a take to a performance.
 
-This and `facert.retarget.training` are the one path of the data: take, normalised arrays, method,
-take. Nothing else normalises, and nothing else undoes it.
+What a model is given is normalised by the units that `facert.retarget.training` found, and what it
+predicts is brought back by them, here and in `facert.retarget.stream` alone. (Parts of the
+mathematics have units of their own inside: the motion of a source, regions, stages of a search.)
 """
 
 from __future__ import annotations
@@ -18,20 +19,16 @@ from facert.data.arrays import FloatArray
 from facert.data.take import Source, Take
 from facert.errors import InputError, NumericalError
 from facert.models.threads import threads_for
-from facert.preprocess.faults import without_faults
-from facert.preprocess.motion.estimate import FEWEST, estimate_if_it_moves, grid
-from facert.preprocess.neutral import at_rest, calibrated
-from facert.retarget.adjustments import Adjustments
+from facert.preprocess.clean_source import clean_source
+from facert.preprocess.motion.estimate import FEWEST, grid
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
-from facert.retarget.options import RetargetOptions
-from facert.retarget.stream import ABSURD, RetargetStream
+from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
+from facert.retarget.stream import RetargetStream
 
 log = logging.getLogger(__name__)
 
-# Distances from the training take's mean, in normalised units.
-FAR = 5.0
 Mode = Literal["offline", "online"]
 
 
@@ -56,8 +53,8 @@ class Retargeter(TrainedModel):
             Its source must hold this retargeter's markers or weights, in any order; NaN is
             mapped as not observed.
         mode : {"offline", "online"}
-            All frames at once, cleaned by what those before and after tell; or one after the
-            other, as a live stream would be.
+            All frames at once, cleaned by those before and after; or one after the other, as a
+            live stream would be.
         options : RetargetOptions, optional
             What is done about bad markers, noise, the actor's rest and single controls.
         device : str
@@ -76,13 +73,12 @@ class Retargeter(TrainedModel):
             raise InputError("mode", "offline or online", repr(mode), "Choose one of these.")
         if self.units and take.units and self.units != take.units:
             raise InputError("units", self.units, take.units, "Convert the take to these units.")
-        self.layout.require_kind(take.source.kind)
         if options.neutral is not None and self.settings.neutral is None:
             log.warning(
                 "the model does not know the actor at rest and takes the smallest pose for it: "
                 "name such frames in training as well"
             )
-        there = replace(self, method=self.method.on(device))
+        there = self if device == "cpu" else replace(self, method=self.method.on(device))
         try:
             if mode == "online":
                 return self._one_by_one(take, options)
@@ -112,48 +108,29 @@ class Retargeter(TrainedModel):
 
     def _together(self, take: Take, options: RetargetOptions) -> Take:
         """All frames at once: smoothed over time, then mapped in one batch."""
-        observed = without_faults(take) if options.detect else take
-        source = self.layout.arrange(observed.source)
-        X = source.matrix
-        if options.neutral is not None:
-            rest = at_rest(X, np.asarray(options.neutral, dtype=np.int64))
-            X = calibrated(X, rest, self.neutral, self.layout.kind)
-        measured = self.source_units.apply(X)
-        _check_distance(measured)
-        smoothed = None
-        if options.smooth:
-            smoothed = estimate_if_it_moves(X, take.time, options.sigma)
+        found = clean_source(take, self.layout, self.source_units, self.neutral, options)
         adjust = options.adjustments or Adjustments.none(len(self.controls.names))
-        if smoothed is None:
-            said, std_x = self.method.predict(measured), None
-        else:
-            log.info("%s", smoothed.summary(take.units))
-            clean, std_x = self.source_units.apply(smoothed.frames), smoothed.std
-            input_variance = np.where(np.isnan(X), smoothed.std / self.source_units.scale, 0.0) ** 2
-            said = self.method.predict(clean, input_variance)
-            if not adjust.smooth_all:
-                rough = self.method.predict(np.where(np.isnan(X), clean, measured), input_variance)
-                said = replace(said, Y=adjust.mixed(said.Y, rough.Y))
-        if len(said.X) >= FEWEST:  # of single frames there is nothing to tell in shares
-            self._tell_what_is_new(said.X)
-        params, std = self.finished(said.Y, said.std, adjust)
-        cleaned = source.with_matrix(self.source_units.undo(said.X), std_x)
-        return self._performance(take, cleaned, params, std)
+        predicted = self.method.predict(found.clean, found.input_variance)
+        if found.std is not None and not adjust.smooth_all:
+            rough = self.method.predict(found.filled, found.input_variance)
+            predicted = replace(predicted, Y=adjust.mixed(predicted.Y, rough.Y))
+        if len(predicted.X) >= FEWEST:  # shares of single frames mean nothing
+            self._warn_of_novelty(predicted.X)
+        scale = PoseScale(self.target_units, self.bounds, adjust)
+        return self._performance(
+            take,
+            found.source.with_matrix(self.source_units.undo(predicted.X), found.std),
+            scale.params(predicted.Y),
+            scale.std(predicted.std),
+        )
 
     def _one_by_one(self, take: Take, options: RetargetOptions) -> Take:
         """One frame after the other, as they would come live."""
-        values, rest = take.source.values, None
-        observed = without_faults(take).source if options.detect else take.source
-        X = self.layout.arrange(observed).matrix
-        if options.neutral is not None:
-            frames = np.asarray(options.neutral, dtype=np.int64)
-            rest = at_rest(observed.matrix, frames).reshape(values.shape[1:])
-            own = at_rest(X, frames)
-            X = calibrated(X, own, self.neutral, self.layout.kind)
-        _check_distance(self.source_units.apply(X))
+        whole = replace(options, smooth=False)  # what is looked at beforehand is not smoothed
+        rest = clean_source(take, self.layout, self.source_units, self.neutral, whole).rest
         stream = self.stream(take.source.names, 1.0 / grid(take.time)[1], options, rest)
         with threads_for(1):
-            steps = [stream.step(frame).complete() for frame in values]
+            steps = [stream.step(frame).complete() for frame in take.source.values]
         stds = [step.std for step in steps if step.std is not None]
         return self._performance(
             take,
@@ -162,7 +139,7 @@ class Retargeter(TrainedModel):
             np.array(stds) if stds else None,
         )
 
-    def _tell_what_is_new(self, frames: FloatArray) -> None:
+    def _warn_of_novelty(self, frames: FloatArray) -> None:
         """Warn of cleaned, normalised frames (T, d_x) that are like no posed one."""
         if self.labelled is None or not len(self.labelled):
             return
@@ -177,26 +154,6 @@ class Retargeter(TrainedModel):
         return replace(
             take, source=source, controls=self.controls, params=params, std=std, animation=None
         )
-
-
-def _check_distance(frames: FloatArray) -> None:
-    """Frames in normalised units should be a few units from zero at most.
-
-    Raises
-    ------
-    InputError
-        When they are so far that nothing can be computed.
-    """
-    distance = float(np.nanmax(np.abs(frames)))
-    if distance > ABSURD:
-        raise InputError(
-            "/source",
-            "positions near those of the training take",
-            f"{distance:.1e} times its largest deviation away",
-            "Check units and origin.",
-        )
-    if float(np.nanmedian(np.abs(frames))) > FAR:
-        log.warning("the source lies far from the training take: check units and head motion")
 
 
 def load(path: str | Path) -> Retargeter:

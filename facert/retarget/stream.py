@@ -10,44 +10,40 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Prediction
+from facert.preprocess.clean_source import ABSURD
 from facert.preprocess.live_faults import MarkerWatch
 from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
-from facert.preprocess.source_layout import FramePicker
-from facert.retarget.adjustments import Adjustments
 from facert.retarget.model import TrainedModel
-from facert.retarget.options import RetargetOptions
+from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
 
-ABSURD = 1e6
-"""Distance from the training take's mean, in normalised units, at which nothing can be computed."""
-
-Tell = Callable[[], tuple[FloatArray | None, FloatArray]]
+Details = Callable[[], tuple[FloatArray | None, FloatArray]]
 """Works out the standard deviation of a pose, and the cleaned source."""
 
 
 class Streamed:
-    """What became of one frame.
+    """One mapped frame.
 
     Parameters
     ----------
     params : array, shape (P,)
         The pose.
-    tell : callable
+    details : callable
         Works out `std` and `source` when somebody asks: who wants the pose at once does not.
     """
 
-    def __init__(self, params: FloatArray, tell: Tell) -> None:
+    def __init__(self, params: FloatArray, details: Details) -> None:
         self.params = params
-        self._tell: Tell | None = tell
+        self._details: Details | None = details
         self._std: FloatArray | None = None
         self._source = np.zeros(0)
 
     def complete(self) -> Streamed:
         """Work out all, and let go of what that takes; itself."""
-        if self._tell is not None:
-            self._std, self._source = self._tell()
-            self._tell = None
+        if self._details is not None:
+            self._std, self._source = self._details()
+            self._details = None
         return self
 
     @property
@@ -93,12 +89,11 @@ class RetargetStream:
         options = options or RetargetOptions()
         if fps is not None and not 0.0 < fps < np.inf:
             raise InputError("fps", "a number above 0", repr(fps), "Give the true rate.")
-        places = model.layout.places(names)
         markers = model.layout.kind == "markers"
         self._model = model
         self._shape = (len(names), 3) if markers else (len(names),)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
-        self._picker = FramePicker(places, len(names), 3 if markers else 1)
+        self._columns = model.layout.columns(names)
         self._watch = MarkerWatch(len(names)) if options.detect and markers else None
         self._new_filter = partial(_filter, model, fps, options)
         self._filter = self._new_filter()
@@ -107,7 +102,7 @@ class RetargetStream:
         self._meter = None if given else NoiseMeter(len(model.source_units.mean))
         self._unheard: FloatArray | None = None
         self._adjustments = options.adjustments or Adjustments.none(len(model.controls.names))
-        self._finish = _Finish(model, self._adjustments)
+        self._scale = PoseScale(model.target_units, model.bounds, self._adjustments)
         self._smooth = model.method.stream()
         self._rough = None if self._adjustments.smooth_all else model.method.stream()
         self._calibration: Calibration | None = None
@@ -122,7 +117,7 @@ class RetargetStream:
         rest : array, shape of a frame
             The source with the actor at rest; NaN where that is not known.
         """
-        own, model = self._picker.pick(self._checked(rest)), self._model
+        own, model = self._columns.pick(self._checked(rest).ravel()), self._model
         self._calibration = Calibration.of(own, model.neutral, model.layout.kind)
         self._filter = self._new_filter()  # what it knows is where the face was
         if self._filter is not None and self._heard is not None:
@@ -162,12 +157,12 @@ class RetargetStream:
             expected, found = "positions near those of the training take", "others, far away"
             raise InputError("the frame", expected, found, "Skip it; check units and origin.")
         clean, input_variance = self._cleaned(frame, seen)
-        said = self._smooth.step(clean[None], input_variance)
-        Y = said.Y
+        predicted = self._smooth.step(clean[None], input_variance)
+        Y = predicted.Y
         if self._rough is not None:
             measured = frame if seen is None else np.where(seen, frame, clean)
             Y = self._adjustments.mixed(Y, self._rough.step(measured[None], input_variance).Y)
-        return Streamed(self._finish.params(Y[0]), lambda: self._told(said))
+        return Streamed(self._scale.params(Y[0]), lambda: self._completed(predicted))
 
     def _checked(self, values: FloatArray) -> FloatArray:
         """A frame as an array; raises InputError when it is not one."""
@@ -183,7 +178,7 @@ class RetargetStream:
             bad = self._watch.step(values)
             if bad.any():
                 values = np.where(bad[:, None], np.nan, values)
-        row = self._picker.pick(values)
+        row = self._columns.pick(values.ravel())
         hidden = np.isnan(row)
         if not hidden.any():
             return row, None
@@ -200,34 +195,11 @@ class RetargetStream:
         mean = self._filter.step(frame, seen)
         return mean, None if seen is None else np.where(seen, 0.0, self._filter.variance)[None]
 
-    def _told(self, said: Prediction) -> tuple[FloatArray | None, FloatArray]:
+    def _completed(self, predicted: Prediction) -> tuple[FloatArray | None, FloatArray]:
         """Standard deviation of the pose, and the cleaned source."""
-        source = self._model.source_units.undo(said.X[0])
-        return self._finish.spread(said.std), source.reshape(self._cleaned_shape)
-
-
-class _Finish:
-    """`TrainedModel.finished` for single poses: limits, gain and limits again as one of each."""
-
-    def __init__(self, model: TrainedModel, adjustments: Adjustments) -> None:
-        units, gain = model.target_units, adjustments.gain
-        self._scale, self._offset = units.scale * gain, units.mean * gain
-        self._spread = units.scale * np.abs(gain)
-        ends = np.tile([[-np.inf], [np.inf]], len(gain)) if model.bounds is None else model.bounds.T
-        moved = np.where(gain == 0.0, 0.0, ends * np.where(gain == 0.0, 1.0, gain))  # 0 inf is NaN
-        self._low, self._high = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
-
-    def params(self, Y: FloatArray) -> FloatArray:
-        """Of a normalised pose, (P,)."""
-        params = Y * self._scale
-        params += self._offset
-        np.maximum(params, self._low, out=params)
-        np.minimum(params, self._high, out=params)
-        return params
-
-    def spread(self, std: FloatArray | None) -> FloatArray | None:
-        """Of that of the normalised pose, (1, P)."""
-        return None if std is None else np.asarray(std[0] * self._spread)
+        source = self._model.source_units.undo(predicted.X[0])
+        std = None if predicted.std is None else self._scale.std(predicted.std[0])
+        return std, source.reshape(self._cleaned_shape)
 
 
 def _filter(

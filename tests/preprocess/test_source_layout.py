@@ -3,25 +3,24 @@
 import numpy as np
 import pytest
 
-from facert.preprocess.source_layout import FramePicker, SourceLayout
+from facert.data.take import Source
+from facert.preprocess.source_layout import SourceLayout
 
 NAMES = tuple("abcdefg")
 
 
 @pytest.mark.parametrize("kind", ["markers", "weights"])
 @pytest.mark.parametrize("theirs", ["abcdefg", "gxfedcbya", "bdacf"])
-def test_frame_by_frame_the_same_is_picked_as_of_all_frames(kind, theirs):
+def test_a_source_is_brought_into_the_order_of_the_model(kind, theirs):
     shape = (5, len(theirs), 3) if kind == "markers" else (5, len(theirs))
     values = np.random.default_rng(0).normal(size=shape)
     values[0, 2] = np.nan
-    places = SourceLayout(kind, NAMES).places(theirs)
-    picker = FramePicker(places, len(theirs), 3 if kind == "markers" else 1)
-    rows = np.array([picker.pick(frame) for frame in values])
-    np.testing.assert_array_equal(rows, places.pick(values).reshape(5, -1))
-
-
-def test_a_picked_frame_stays_when_the_next_is_picked():
-    picker = FramePicker(SourceLayout("weights", NAMES).places(NAMES), 7, 1)
-    first = picker.pick(np.arange(7.0))
-    picker.pick(np.zeros(7))
-    np.testing.assert_array_equal(first, np.arange(7.0))
+    source, layout = Source(values, tuple(theirs)), SourceLayout(kind, NAMES)
+    arranged = layout.arrange(source)
+    assert arranged.names == NAMES
+    for column, name in enumerate(NAMES):
+        expected = values[:, theirs.index(name)] if name in theirs else np.nan
+        np.testing.assert_array_equal(arranged.values[:, column], expected)
+    columns = layout.columns(theirs)
+    rows = np.array([columns.pick(frame.ravel()) for frame in values])
+    np.testing.assert_array_equal(rows, arranged.matrix)

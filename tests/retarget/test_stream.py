@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 import facert
 from facert import InputError, Settings, Source
 from facert.preprocess.motion.filtering import HEARD
-from facert.retarget.adjustments import Adjustments
-from facert.retarget.options import AS_IT_IS, RetargetOptions
-from facert.retarget.stream import _Finish
+from facert.retarget.options import AS_IT_IS, Adjustments, PoseScale, RetargetOptions
 
 
 @pytest.fixture(scope="module")
@@ -203,14 +201,19 @@ def test_std_and_source_are_those_of_their_own_frame_whenever_asked_for(retarget
     st.lists(st.tuples(st.floats(-2.0, 0.5), st.floats(0.5, 2.0)), min_size=4, max_size=4),
     st.booleans(),
 )
-def test_single_poses_are_finished_as_all_are(retargeter, gain, limits, bounded):
+def test_poses_are_clipped_to_their_bounds_before_the_gain_and_to_the_limits_after(
+    retargeter, gain, limits, bounded
+):
     adjustments = Adjustments(np.array(gain), np.array(limits), np.ones(4))
-    model = replace(retargeter, bounds=retargeter.bounds if bounded else None)
+    units, bounds = retargeter.target_units, retargeter.bounds if bounded else None
     Y = 5.0 * np.random.default_rng(0).normal(size=(20, 4))
-    params, std = model.finished(Y, np.abs(Y), adjustments)
-    finish = _Finish(model, adjustments)
-    np.testing.assert_allclose([finish.params(y) for y in Y], params, atol=1e-12)
-    np.testing.assert_allclose([finish.spread(y[None]) for y in np.abs(Y)], std, atol=1e-12)
+    scale = PoseScale(units, bounds, adjustments)
+    params = np.clip(units.undo(Y), *bounds.T) if bounded else units.undo(Y)
+    params = np.clip(params * gain, *adjustments.limits.T)
+    std = np.abs(Y) * units.scale * np.abs(gain)
+    np.testing.assert_allclose(scale.params(Y), params, atol=1e-12)
+    np.testing.assert_allclose([scale.params(y) for y in Y], params, atol=1e-12)
+    np.testing.assert_allclose(scale.std(np.abs(Y)), std, atol=1e-12)
 
 
 def test_a_stream_may_learn_later_where_the_actor_rests(retargeter, noisy):

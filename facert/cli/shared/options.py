@@ -79,8 +79,7 @@ def chosen_options(
     from facert.data.ranges import parse_frames
     from facert.errors import reading
     from facert.io.toml import read_toml
-    from facert.retarget.adjustments import Adjustments
-    from facert.retarget.options import RetargetOptions
+    from facert.retarget.options import Adjustments, RetargetOptions
 
     adjustments = None
     if controls is not None:

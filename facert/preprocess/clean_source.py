@@ -1,0 +1,151 @@
+"""From a take to a clean source in the units of a model, ready to map: the door of `retarget`."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.data.normalisation import Normalisation
+from facert.data.take import Source, Take
+from facert.errors import InputError
+from facert.preprocess.faults import without_faults
+from facert.preprocess.motion.estimate import estimate_if_it_moves
+from facert.preprocess.neutral import Calibration, at_rest
+from facert.preprocess.source_layout import SourceLayout
+
+log = logging.getLogger(__name__)
+
+FAR, ABSURD = 5.0, 1e6
+"""Distances from the training take's mean, in normalised units, of which the log warns, and at
+which nothing can be computed."""
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """How a source is treated before it is mapped.
+
+    Parameters
+    ----------
+    detect : bool
+        Take frozen, swapped and otherwise bad markers as not observed.
+    smooth : bool
+        Take noise out, and fill gaps, by the motion over neighbouring frames.
+    sigma : float, optional
+        Standard deviation of the capture noise, in the take's units; by default estimated from the
+        take; a live stream begins with that of the training take and estimates its own.
+    neutral : sequence of int, optional
+        Frames in which the actor rests; see `facert.preprocess.neutral`.
+    """
+
+    detect: bool = True
+    smooth: bool = True
+    sigma: float | None = None
+    neutral: Sequence[int] | None = None
+
+    def __post_init__(self) -> None:
+        if self.sigma is not None and not 0.0 <= self.sigma < math.inf:
+            raise InputError("sigma", "a number from 0", repr(self.sigma), "Change it.")
+
+
+@dataclass(frozen=True, eq=False)
+class CleanSource:
+    """A source with the markers or weights of a model, in their order.
+
+    Parameters
+    ----------
+    source : Source
+        Without bad markers, in the take's units.
+    rest : array, shape of a frame of the take, or None
+        The actor at rest, where frames were named for it.
+    measured, clean : array, shape (T, d_x)
+        Calibrated frames in normalised units, NaN: not observed, and the same without noise and
+        gaps; the measured ones where nothing was smoothed.
+    std : array, shape (T, d_x), or None
+        Standard deviation of the clean frames, in the take's units.
+    input_variance : array, shape (T, d_x), or None
+        Variance of the clean frames where they were not observed, in normalised units; 0 elsewhere.
+    """
+
+    source: Source
+    rest: FloatArray | None
+    measured: FloatArray
+    clean: FloatArray
+    std: FloatArray | None = None
+    input_variance: FloatArray | None = None
+
+    @property
+    def filled(self) -> FloatArray:
+        """The measured frames with their gaps filled, noise and all, (T, d_x)."""
+        return np.where(np.isnan(self.measured), self.clean, self.measured)
+
+
+def clean_source(
+    take: Take,
+    layout: SourceLayout,
+    units: Normalisation,
+    neutral: FloatArray,
+    options: SourceOptions,
+) -> CleanSource:
+    """Hide bad markers of a take, calibrate and normalise its source, and smooth it over time.
+
+    Parameters
+    ----------
+    take : Take
+    layout : SourceLayout
+        Of the model.
+    units : Normalisation
+        Of its source.
+    neutral : array, shape (d_x,)
+        The actor at rest in the take that it was trained on.
+    options : SourceOptions
+
+    Raises
+    ------
+    InputError
+        When the source is of another kind, lacks names that the model needs, or lies so far off
+        that nothing can be computed.
+    """
+    observed = (without_faults(take) if options.detect else take).source
+    layout.require_kind(observed.kind)
+    columns = layout.columns(observed.names)
+    source, rest = columns.arrange(observed), None
+    X = source.matrix
+    if options.neutral is not None:
+        frames = np.asarray(options.neutral, dtype=np.int64)
+        own = at_rest(observed.matrix, frames)
+        rest = own.reshape(observed.values.shape[1:])
+        X = Calibration.of(columns.pick(own), neutral, layout.kind).apply(X)
+    measured = units.apply(X)
+    _check_distance(measured)
+    found = estimate_if_it_moves(X, take.time, options.sigma) if options.smooth else None
+    if found is None:
+        return CleanSource(source, rest, measured, measured)
+    log.info("%s", found.summary(take.units))
+    input_variance = np.where(np.isnan(X), found.std / units.scale, 0.0) ** 2
+    clean = units.apply(found.frames)
+    return CleanSource(source, rest, measured, clean, found.std, input_variance)
+
+
+def _check_distance(frames: FloatArray) -> None:
+    """Check that frames in normalised units are a few units from zero at most.
+
+    Raises
+    ------
+    InputError
+        When they are so far that nothing can be computed.
+    """
+    distance = float(np.nanmax(np.abs(frames)))
+    if distance > ABSURD:
+        raise InputError(
+            "/source",
+            "positions near those of the training take",
+            f"{distance:.1e} times its largest deviation away",
+            "Check units and origin.",
+        )
+    if float(np.nanmedian(np.abs(frames))) > FAR:
+        log.warning("the source lies far from the training take: check units and head motion")
