@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 import facert
+from experiments.drawing import save
 from facert.data.arrays import rms
-from facert.demo import character_rig, performance_take
-from facert.demo.takes import training_take
+from facert.demo import character_rig, performance_take, training_take
 from facert.render.faces import posed_face
 from facert.render.sheet import render_sheet
 
@@ -32,6 +32,9 @@ def main() -> None:
     picture = parser.parse_args().picture
     posed, performance, rig = training_take(posed=None), performance_take(), character_rig()
     assert posed.params is not None
+    assert performance.params is not None
+    still = posed.params.mean(axis=0) - performance.params
+    print(f"the mean pose: RMS {rms(still):.3f}")
     faces = []
     for count in COUNTS:
         params = np.full_like(posed.params, np.nan)
@@ -42,9 +45,9 @@ def main() -> None:
         assert result.params is not None
         error = rms(result.params - performance.params)
         print(f"{count} poses: RMS {error:.3f}")
-        faces.append(posed_face(result, rig, f"{count} poses\nRMS {error:.2f}"))
+        faces.append(posed_face(result, rig, f"{count} poses, RMS {error:.2f}"))
     faces.append(posed_face(performance, rig, "truth"))
-    render_sheet(faces, FRAMES, pixels=PIXELS).savefig(picture)
+    save(render_sheet(faces, FRAMES, pixels=PIXELS), picture)
 
 
 if __name__ == "__main__":

@@ -32,8 +32,8 @@ class Block:
     """What stands between two fences of a page, and what the first says of it.
 
     Commands have no language; `sh` has commands that end with Ctrl-C, of which the options are
-    checked; `text` what the commands before it print; `python` a script to run; and what has a
-    name after its language is a file that the reader writes.
+    checked; `bash` what makes an installation; `text` what the commands before it print; `python` a
+    script to run; and what has a name after its language is a file that the reader writes.
     """
 
     language: str
@@ -85,9 +85,9 @@ def inside(folder: Path) -> Iterator[None]:
 
 
 def run(line: str) -> str:
-    """Run a command line; return what it prints, notes included."""
+    """Run a command line, its comment aside; return what it prints, notes included."""
     command, _, output = line.partition(" > ")
-    program, *arguments = shlex.split(command)
+    program, *arguments = shlex.split(command, comments=True)
     if program == "cd":
         os.chdir(arguments[0])
         return ""
@@ -151,7 +151,7 @@ def unknown_options(line: str) -> list[str]:
 
 def _resolved(line: str) -> tuple[str, Any, list[str]]:
     """Name and object of the command in a line, and its arguments."""
-    name, *arguments = shlex.split(line)
+    name, *arguments = shlex.split(line, comments=True)
     command: Any = typer.main.get_command(app.app)
     while arguments and isinstance(command, typer.core.TyperGroup):
         name = arguments.pop(0)

@@ -13,7 +13,9 @@ from following import DOCS, ROOT, blocks_of, check_options, follow, stand_in, un
 import facert
 from facert.demo.character import animate
 
+README, DATA = ROOT / "README.md", ROOT / "data" / "README.md"
 PAGES = sorted(DOCS.glob("*.md"))
+TEXTS = [README, DATA, *PAGES]
 ON_THEIR_OWN = {
     "phone-to-blender.md": "phone-demo/shot.h5",
     "optical-markers.md": "optical-demo/result.h5",
@@ -46,26 +48,43 @@ def test_a_guide_goes_on_from_the_quick_start(name: str, quick_start: Path, tmp_
     assert "(quick-start.md)" in (DOCS / name).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
+def test_the_readme_works_as_printed_with_a_phones_recordings(tmp_path: Path) -> None:
+    stand_in()["main"](["phone", str(tmp_path / "phone-demo")])
+    follow(README, tmp_path / "phone-demo")
+    made = {path.name for path in (tmp_path / "phone-demo").iterdir()}
+    assert {"phone.safetensors", "shot.h5", "shot.png", "shot.glb", "result.h5"} <= made
+
+
+@pytest.mark.slow
+def test_own_data_works_as_printed(tmp_path: Path) -> None:
+    rows = [f"{frame / 30},{frame / 100},{frame % 7}" for frame in range(100)]
+    (tmp_path / "recording.csv").write_text("\n".join(["time,eyeBlinkLeft,jawOpen", *rows]))
+    follow(DOCS / "your-data.md", tmp_path)
+    made = {path.name for path in tmp_path.iterdir()}
+    assert {"take.h5", "result.csv", "curves.png", "posed.h5", "python.h5"} <= made
+
+
 def test_every_page_with_commands_is_followed() -> None:
     commanding = {page.name for page in PAGES if any(not b.language for b in blocks_of(page))}
-    assert commanding == {"quick-start.md", *ON_THEIR_OWN, *GOING_ON}
+    assert commanding == {"quick-start.md", "your-data.md", *ON_THEIR_OWN, *GOING_ON}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_commands_that_wait_for_ctrl_c_have_options_that_exist(page: Path) -> None:
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_that_are_not_followed_have_options_that_exist(page: Path) -> None:
     for block in blocks_of(page):
-        if block.language == "sh":
+        if block.language == "sh" or (page == DATA and not block.language):
             for command in block.commands:
                 check_options(command)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_within_the_text_exist_with_their_options(page: Path) -> None:
     for command in re.findall(r"`(facert [^`]+)`", page.read_text(encoding="utf-8")):
         assert not unknown_options(command), command
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     for target, _, place in LINK.findall(page.read_text(encoding="utf-8")):
         there = page.parent / target if target else page
@@ -85,5 +104,5 @@ def test_every_page_is_in_the_index() -> None:
 
 
 def test_no_page_names_a_place_of_this_machine() -> None:
-    for path in [*PAGES, DOCS / "stand_in.py"]:
+    for path in [*TEXTS, DOCS / "stand_in.py"]:
         assert str(ROOT) not in path.read_text(encoding="utf-8")
