@@ -36,10 +36,10 @@ format: $(VENV)/.installed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# The page of docs that is made from docstrings, and the table of settings.
+# The page of docs that is made from docstrings, and the tables of settings and formats.
 docs: $(VENV)/.installed
 	$(BIN)/python docs/make_api.py
-	$(BIN)/python docs/make_settings.py
+	$(BIN)/python docs/make_tables.py
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m experiments.bench

@@ -106,3 +106,9 @@ def test_every_page_is_in_the_index() -> None:
 def test_no_page_names_a_place_of_this_machine() -> None:
     for path in [*TEXTS, DOCS / "stand_in.py"]:
         assert str(ROOT) not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_modules_that_a_page_names_exist(page: Path) -> None:
+    for name in re.findall(r"`(facert/[\w/.]+)`", page.read_text(encoding="utf-8")):
+        assert (ROOT / name).exists(), name

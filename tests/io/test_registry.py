@@ -4,31 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from facert.io.registry import FORMATS, endings, function, listed, table_rows
-
-DOCS = Path(__file__).parents[2]
-TABLE = next(
-    text
-    for text in (
-        (DOCS / name).read_text(encoding="utf-8") for name in ("docs/files.md", "README.md")
-    )
-    if "| ending | read | written |" in text
-)
+from facert.io.registry import FORMATS, endings, function, listed
 
 
 @pytest.mark.parametrize("one", FORMATS, ids=lambda one: one.endings[0])
 def test_every_function_of_a_format_is_there(one) -> None:
     names = [*one.read.values(), *one.write.values(), one.kind_of, one.targets]
     assert all(callable(function(name)) for name in names if name)
-
-
-@pytest.mark.parametrize("row", table_rows())
-def test_the_table_in_the_docs_is_that_of_the_registry(row) -> None:
-    assert row in TABLE.splitlines()
 
 
 def test_endings_are_those_of_a_kind() -> None:
