@@ -1,4 +1,4 @@
-"""`complete_pose`: names and values in, a whole pose of the character out."""
+"""A whole pose of a character from names and values of some of its controls: `complete_pose`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BEYOND = 1e-9  # of a control's range: rounding
 
 @dataclass(frozen=True, eq=False)
 class CompletedPose:
-    """A whole pose of which some controls were given.
+    """A whole pose of a character, completed from some of its controls.
 
     Parameters
     ----------
@@ -127,11 +127,10 @@ def complete_pose(
     asked = _given(controls, given, soft)
     if samples < 0:
         raise InputError("samples", "a number from 0", f"{samples}", "Ask for some, or for none.")
-    _warn_of_range(controls, known, asked)
     held = _held(controls.names, hold, asked)
     rng = np.random.default_rng(seed)
     completion = Completion.learn(known, asked.controls)
-    _warn_if_far(completion, asked)
+    _warn_if_far(controls, completion, asked)
     if start is not None:
         posed = correct(*_start(start, controls), known, asked, samples, rng, held)
     elif len(held):
@@ -152,10 +151,11 @@ def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
     InputError
         When there are fewer than three.
     """
+    controls, bounds = character.controls, None
     if isinstance(character, Take):
-        controls, poses, bounds = character.controls, _poses_of(character), None
+        poses = _poses_of(character)
     else:
-        controls, poses, bounds = character.controls, character.poses, character.bounds
+        poses, bounds = character.poses, character.bounds
     if poses is None or controls is None or len(poses) < LEAST:
         found = "none" if poses is None else f"{len(poses)}"
         fix = "Train the model again, or give a take with poses."
@@ -178,7 +178,12 @@ def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Give
         raise InputError("given controls", "at least one", "none", "Set a control to a value.")
     if not (math.isfinite(soft) and soft >= 0.0):
         raise InputError("soft", "a standard deviation from 0", f"{soft}", "Give another.")
-    positions = _positions(list(wanted), controls.names)
+    index = NameIndex(controls.names)
+    for name in wanted:
+        if index.find(name) is None:
+            fix = _did_you_mean(name, controls.names)
+            raise InputError("given controls", "names of controls", repr(name), fix)
+    positions = match(list(wanted), controls.names, "given controls")
     values = np.array(list(wanted.values()), dtype=np.float64)
     for name, position, value in zip(wanted, positions, values, strict=True):
         low, high = (-np.inf, np.inf) if controls.limits is None else controls.limits[position]
@@ -190,45 +195,33 @@ def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Give
     return Given(positions, values, soft)
 
 
-def _positions(wanted: list[str], names: tuple[str, ...]) -> IntArray:
-    """Where the wanted controls stand among all; no two at one place."""
-    index = NameIndex(names)
-    for name in wanted:
-        if index.find(name) is None:
-            fix = _other_than(name, names)
-            raise InputError("given controls", "names of controls", repr(name), fix)
-    return match(wanted, names, "given controls")
-
-
 def _held(names: tuple[str, ...], patterns: Sequence[str], given: Given) -> IntArray:
     """The controls that fit a pattern and are not given, rising."""
     found: set[int] = set()
     for pattern in patterns:
         places = fitting(pattern, names)
         if not places:
-            fix = _other_than(pattern, names)
+            fix = _did_you_mean(pattern, names)
             raise InputError("hold", "controls, or a pattern that some fit", repr(pattern), fix)
         found.update(places)
     return np.setdiff1d(np.array(sorted(found), dtype=np.int64), given.controls)
 
 
-def _other_than(name: str, names: tuple[str, ...]) -> str:
+def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     meant = instead_of(name, names)
     return f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
 
 
-def _warn_of_range(controls: Controls, known: KnownPoses, given: Given) -> None:
-    """Beyond every known value, what the others do is a guess."""
-    low, high = known.poses.min(axis=0), known.poses.max(axis=0)
+def _warn_if_far(controls: Controls, completion: Completion, given: Given) -> None:
+    """Warn where known poses do not reach: there the prediction is no more than a guess."""
+    known = completion.known.poses
+    low, high = known.min(axis=0), known.max(axis=0)
     for index, value in zip(given.controls, given.values, strict=True):
         name, slack = controls.names[index], BEYOND * (high[index] - low[index])
         if high[index] - low[index] <= BEYOND * max(abs(low[index]), 1.0):
-            log.warning("%s never moves in the known poses: it tells nothing of the others", name)
+            log.warning("%s never moves in the known poses: the others do not follow it", name)
         elif not low[index] - slack <= value <= high[index] + slack:
             log.warning("%s is %.3g to %.3g in the known poses", name, low[index], high[index])
-
-
-def _warn_if_far(completion: Completion, given: Given) -> None:
     if completion.farness(given.values) > FAR:
         log.warning("no known pose comes near the given values: the others are a guess")
 

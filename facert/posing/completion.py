@@ -1,8 +1,8 @@
 """The pose to expect given some of its controls, and others that are plausible too.
 
-`facert.posing.pose_regression` predicts the rest of the pose. How far it may be off is told by the
-known poses: each, left out, misses its own rest by a vector e_i. A plausible pose is the predicted
-one plus the error of a known pose that has similar given controls,
+`facert.posing.pose_regression` predicts the rest of the pose. How far it may be off follows from
+the leave-one-out error e_i of each known pose. A plausible pose is the predicted one plus the error
+of a known pose that has similar given controls,
 
     y = clip(f(g) + √(1 + 2 min d) e_i),      P(i) ~ exp(-γ d_i) + ε/n,      d_i = |g - g_i|/d̄,
 
@@ -37,7 +37,7 @@ STILL = 1e-13  # share of the largest variance: below, known poses do not vary a
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A pose and what is known about it.
+    """A pose, how certain it is, and samples of other plausible poses.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Completion:
         The given controls, and the others.
     regression : PoseRegression
     errors : array, shape (n, r)
-        What each known pose, left out and clipped, misses.
+        Leave-one-out errors of the clipped predictions of the known poses.
     """
 
     known: KnownPoses
@@ -75,7 +75,7 @@ class Completion:
 
     @classmethod
     def learn(cls, known: KnownPoses, given: IntArray) -> Completion:
-        """From known poses, for given controls (k,)."""
+        """The completion for given controls (k,), from known poses."""
         poses = known.poses
         rest = np.setdiff1d(np.arange(poses.shape[1]), given)
         regression = PoseRegression.learn(poses[:, given], poses[:, rest])
@@ -127,7 +127,7 @@ class Completion:
         return self._whole(values, self.regression(values) + widening * self.errors[chosen])
 
     def farness(self, values: FloatArray) -> float:
-        """How far values (k,) lie from the nearest known pose, in mean distances of two poses."""
+        """Distance of values (k,) from the nearest known pose, in mean distances of two poses."""
         return float(self.regression.distances(values[None]).min())
 
     def _likely(self, given: Given) -> tuple[FloatArray, FloatArray]:

@@ -1,9 +1,9 @@
-"""A retargeted pose with some controls set right: what the others should then be.
+"""Correction of a retargeted pose: some controls are set right, the others follow.
 
 The errors of a retargeted pose go together as poses do: where the smile is too weak, so are the
-cheeks. But less so, since the source has told most of the pose. So they are taken to be what is
-left of the covariance C of known poses when each control has been seen with a noise of `SEEN` of
-its variance,
+cheeks. But less so, since most of the pose is known from the source. So their covariance is taken
+to be what is left of the covariance C of known poses when each control has been observed with a
+noise of `SEEN` of its variance,
 
     S = C - C (C + R)⁻¹ C,      R = SEEN diag C,
 
@@ -12,8 +12,8 @@ controls known, or known with variance s², the rest of the pose follows:
 
     y = p + E_:G (E_GG + s² I)⁻¹ (g - p_G).
 
-Controls that are held keep p, and tell the others nothing: known poses are few, and of many held
-controls E would predict all others with certainty.
+Controls that are held keep p, and the others do not follow them: known poses are few, and from
+many held controls E would predict all others with certainty.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def correct(
     rng: np.random.Generator,
     held: IntArray | None = None,
 ) -> Posed:
-    """Correct a pose.
+    """The pose with some controls corrected, and the others as they then should be.
 
     Parameters
     ----------
@@ -74,12 +74,12 @@ def correct(
 
 
 def _fix(posed: Posed, controls: IntArray, values: FloatArray) -> None:
-    """Set some controls (k,) to values that are certain."""
+    """Set some controls (k,) to values that are certain, in place."""
     posed.pose[controls], posed.std[controls], posed.samples[:, controls] = values, 0.0, values
 
 
 def _error_covariance(poses: FloatArray, std: FloatArray | None) -> FloatArray:
-    """E, (P, P)."""
+    """E: the covariance of the errors of a retargeted pose, (P, P)."""
     C = np.atleast_2d(np.cov(poses, rowvar=False))
     C[np.diag_indices_from(C)] += max(RIDGE * np.trace(C) / len(C), LEAST)
     S = C - C @ np.linalg.solve(C + SEEN * np.diag(C.diagonal()), C)

@@ -27,8 +27,8 @@ LEAST_GAIN = 1e-6  # an exchange that gains less, relative to the sum, is roundi
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
-    """What is chosen from.
+class MedoidProblem:
+    """Points, the candidates to choose medoids from, and which of these may go together.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ class Choice:
     covered: FloatArray
     rivals: BoolArray
 
-    def weighted(self, weights: FloatArray) -> Choice:
-        """The same with points of different weights above 0, (n,)."""
-        return Choice(self.distances * weights[:, None], self.covered * weights, self.rivals)
+    def weighted(self, weights: FloatArray) -> MedoidProblem:
+        """The same problem with points of different weights above 0, (n,)."""
+        return MedoidProblem(self.distances * weights[:, None], self.covered * weights, self.rivals)
 
     def medoids(self, count: int) -> IntArray:
-        """So many candidates, rivals only where there is nothing else, (count,).
+        """The best candidates, rivals only where there is nothing else, (count,).
 
         The most useful first: the first alone serves best, the second best beside it.
         """
-        chosen = self._added(np.empty(0, dtype=np.int64), np.arange(len(self.rivals)), count)
+        chosen = self._greedy(np.arange(len(self.rivals)), count)
         for _ in range(MOST_EXCHANGES):
             costs = self.exchange_costs(chosen)
             slot, candidate = np.unravel_index(costs.argmin(), costs.shape)
@@ -67,7 +67,7 @@ class Choice:
         return float(np.minimum(self.distances[:, chosen].min(axis=1), self.covered).sum())
 
     def exchange_costs(self, chosen: IntArray) -> FloatArray:
-        """What the sum becomes with one of the chosen (k,) exchanged, (k, m); infinite for rivals.
+        """The sum with one of the chosen (k,) exchanged, (k, m); infinite for rivals.
 
         Leaving a chosen one where it is counts as an exchange too.
         """
@@ -82,12 +82,12 @@ class Choice:
         return costs
 
     def ranked(self, chosen: IntArray) -> IntArray:
-        """The same, the most useful first."""
-        return self._added(np.empty(0, dtype=np.int64), chosen, len(chosen))
+        """The chosen in another order, the most useful first."""
+        return self._greedy(chosen, len(chosen))
 
-    def _added(self, chosen: IntArray, among: IntArray, count: int) -> IntArray:
-        """Some chosen and `count` more, each the best beside those before."""
-        best = self.covered
+    def _greedy(self, among: IntArray, count: int) -> IntArray:
+        """Candidates one after the other, each the best beside those before, (count,)."""
+        chosen, best = np.empty(0, dtype=np.int64), self.covered
         for _ in range(count):
             costs = np.minimum(self.distances[:, among], best[:, None]).sum(axis=0)
             taken = self.rivals[np.ix_(chosen, among)].any(axis=0)
@@ -100,7 +100,7 @@ class Choice:
 
 
 def _two_nearest(near: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Which column is least in each row, its value, and the value of the next."""
+    """The column of the least value in each row, that value, and the next one."""
     order = np.argpartition(near, 1, axis=1)[:, :2]
     pair = np.take_along_axis(near, order, axis=1)
     swapped = pair[:, 0] > pair[:, 1]

@@ -1,7 +1,7 @@
 """From some controls of a pose to the rest: Gaussian process regression with a rough kernel.
 
-Poses of a performance lie in clusters and on folded sheets: from the mouth's corner one can tell
-the cheek, but not by a smooth curve. The squared exponential, whose draws are smooth everywhere,
+Poses of a performance lie in clusters and on folded sheets: the mouth's corner predicts the cheek,
+but not by a smooth curve. The squared exponential, whose draws are smooth everywhere,
 must choose a width, and is wrong for some controls. The exponential kernel, with a linear term,
 
     R(g, g') = (exp(-d/d̄) + gᵀg'/s)/2 + ν δ,        d = |g - g'|,
@@ -36,7 +36,7 @@ TINY = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PoseRegression:
-    """Learned for one set of k given controls from n known poses; r controls are the rest.
+    """Regression of the other r controls on k given ones, learned from n known poses.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class PoseRegression:
     weights : array, shape (n, r)
         R⁻¹ y of each control, averaged over the noises.
     errors : array, shape (n, r)
-        What each known pose, left out, misses: truth less prediction.
+        Leave-one-out errors of the known poses: truth less prediction.
     """
 
     centre: FloatArray
@@ -65,7 +65,7 @@ class PoseRegression:
 
     @classmethod
     def learn(cls, given: FloatArray, rest: FloatArray) -> PoseRegression:
-        """From the given controls (n, k) of known poses and their rest (n, r)."""
+        """The regression from given controls (n, k) of known poses to their rest (n, r)."""
         centre, scale, mean = given.mean(axis=0), _scale(given), rest.mean(axis=0)
         inputs = (given - centre) / scale
         distances, products = cdist(inputs, inputs), inputs @ inputs.T
@@ -91,8 +91,8 @@ class PoseRegression:
 def _scale(given: FloatArray) -> FloatArray:
     """Half-way between each control's own deviation and the largest one.
 
-    A control that moves little is often told with less care, but it is told for a reason. One that
-    never moves tells nothing.
+    A control that moves little is often given with less care, but it is given for a reason. One
+    that never moves predicts nothing: its scale is infinite.
     """
     std = given.std(axis=0)
     still = std <= TINY + 1e-9 * np.abs(given).max(axis=0)

@@ -6,7 +6,7 @@ frames may be posed already; then the others are placed where these are far. Fea
 coordinates, at least half-whitened, so that a lid counts beside a jaw (`facert.models.whitening`).
 
 Among frames that serve nearly as well, those that show most are preferred, as the rest of a frame
-is a guess; among frames that serve alike, those in which the face moves least. (To give up a little
+is imputed; among frames that serve alike, those in which the face moves least. (To give up a little
 of the coverage for calmer frames costs accuracy: these gather around the rest pose.)
 """
 
@@ -24,7 +24,7 @@ from facert.data.take import SourceKind, Take
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
 from facert.models.whitening import whitening
-from facert.posing.medoids import LEAST_GAIN, Choice
+from facert.posing.medoids import LEAST_GAIN, MedoidProblem
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.retargeter import Retargeter
 
@@ -32,7 +32,7 @@ from facert.retarget.retargeter import Retargeter
 POWERS: dict[SourceKind, float] = {"markers": 0.75, "weights": 0.5}
 APART = 0.2  # seconds between two suggested frames, where the take is long enough
 SLACK = 0.002  # by which the sum of distances may rise for a frame that shows more
-MOST_FRAMES = 1500  # that are looked at; in longer takes neighbours in time are much the same
+MOST_FRAMES = 1500  # candidates; in longer takes neighbours in time are much the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,46 +73,48 @@ def suggest_frames(
     ------
     InputError
         When the take has too few frames that show at least half of the source, or the model does
-        not fit it or tells no standard deviation.
+        not fit it or predicts no standard deviation.
     """
     model = have if isinstance(have, Retargeter) else None
     posed = _checked_frames(take.labels if isinstance(have, Retargeter) else have, len(take))
     usable = take.source.valid.mean(axis=1) >= MIN_OBSERVED
-    seen = _at_most(np.setdiff1d(np.flatnonzero(usable), posed), seed)
-    if not 1 <= count <= len(seen):
+    candidates = np.setdiff1d(np.flatnonzero(usable), posed)
+    candidates = np.sort(np.random.default_rng(seed).permutation(candidates)[:MOST_FRAMES])
+    if not 1 <= count <= len(candidates):
         raise InputError(
             "count",
             "1 up to the number of frames without a pose that show half of the source",
-            f"{count} of {len(seen)}",
+            f"{count} of {len(candidates)}",
             "Ask for fewer, or give a longer take.",
         )
-    if model is None:
-        choice = _choice(take, seen, posed[usable[posed]], count)
-    else:
+    if model is not None:
         take = replace(take, source=model.layout.arrange(take.source))
-        choice = _choice(take, seen, posed[usable[posed]], count, model.labelled)
-        choice = choice.weighted(_uncertainty(model, take)[seen])
-    chosen = choice.ranked(_preferred(choice, choice.medoids(count), take, seen))
-    return Suggestion(seen[chosen], _shares(choice, chosen))
+    learned = None if model is None else model.labelled
+    problem = _medoid_problem(take, candidates, posed[usable[posed]], count, learned)
+    if model is not None:
+        problem = problem.weighted(_uncertainty(model, take)[candidates])
+    chosen = _preferred(problem, problem.medoids(count), take, candidates)
+    chosen = problem.ranked(chosen)
+    near = np.column_stack([problem.distances[:, chosen], problem.covered]).argmin(axis=1)
+    shares = np.bincount(near, minlength=count + 1)[:count] / len(candidates)
+    return Suggestion(candidates[chosen], shares)
 
 
-def _choice(
-    take: Take, seen: IntArray, posed: IntArray, count: int, learned: FloatArray | None = None
-) -> Choice:
-    """How far the frames that can be suggested are from each other, and from posed ones.
-
-    The latter may be frames of another take, `learned` (l, d).
-    """
-    features = _features(take, np.concatenate([seen, posed]), learned)
-    others, known = features[: len(seen)], features[len(seen) :]
-    distances, covered = cdist(others, others), np.full(len(seen), np.inf)
+def _medoid_problem(
+    take: Take, candidates: IntArray, posed: IntArray, count: int, learned: FloatArray | None
+) -> MedoidProblem:
+    """Distances of the candidates from each other, from posed frames and from `learned` (l, d)."""
+    features = _features(take, np.concatenate([candidates, posed]), learned)
+    others, known = features[: len(candidates)], features[len(candidates) :]
+    distances, covered = cdist(others, others), np.full(len(candidates), np.inf)
     apart = min(APART, 0.25 * float(take.time[-1] - take.time[0]) / (count + len(posed)))
+    time = take.time[candidates]
     if len(known):
         covered = cdist(others, known).min(axis=1)
-        barred = _near(take.time[posed], take.time[seen], apart).any(axis=0)
+        barred = _near(take.time[posed], time, apart).any(axis=0)
         distances[:, barred] = max(distances.max(), covered.max())  # as good as no pose at all
-    rivals = _near(take.time[seen], take.time[seen], apart) | np.eye(len(seen), dtype=np.bool_)
-    return Choice(distances, covered, rivals)
+    rivals = _near(time, time, apart) | np.eye(len(time), dtype=np.bool_)
+    return MedoidProblem(distances, covered, rivals)
 
 
 def _uncertainty(model: Retargeter, take: Take) -> FloatArray:
@@ -121,7 +123,7 @@ def _uncertainty(model: Retargeter, take: Take) -> FloatArray:
     if std is None:
         raise InputError(
             "have",
-            "a model that tells how certain it is",
+            "a model that predicts how certain it is",
             model.settings.method,
             "Train another method (auto does), or go on from the labels.",
         )
@@ -143,11 +145,6 @@ def _checked_frames(frames: Sequence[int] | IntArray, length: int) -> IntArray:
     return found.astype(np.int64)
 
 
-def _at_most(frames: IntArray, seed: int) -> IntArray:
-    chosen = np.random.default_rng(seed).permutation(frames)[:MOST_FRAMES]
-    return np.sort(chosen)
-
-
 def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> FloatArray:
     """Whitened principal coordinates of some frames and of `learned` ones after them, (n, d)."""
     matrix = take.source.matrix[frames]
@@ -156,10 +153,8 @@ def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> Float
     matrix = matrix[:, ~np.isnan(matrix).all(axis=0)]
     normalised = Normalisation.of(matrix, f"/source/{take.source.kind}").apply(matrix)
     filled = fill_gaps(normalised)
-    features: FloatArray = (filled - filled.mean(axis=0)) @ whitening(
-        filled, POWERS[take.source.kind]
-    )
-    return features
+    axes = whitening(filled, POWERS[take.source.kind])
+    return np.asarray((filled - filled.mean(axis=0)) @ axes)
 
 
 def _near(time: FloatArray, other: FloatArray, apart: float) -> BoolArray:
@@ -167,13 +162,16 @@ def _near(time: FloatArray, other: FloatArray, apart: float) -> BoolArray:
     return np.asarray(np.abs(time[:, None] - other) < apart)
 
 
-def _preferred(choice: Choice, chosen: IntArray, take: Take, seen: IntArray) -> IntArray:
-    """Each exchanged for one that shows more, or moves less, if that serves as well."""
-    hidden, speeds = (~take.source.valid).sum(axis=1)[seen], _speeds(take)[seen]
+def _preferred(
+    problem: MedoidProblem, chosen: IntArray, take: Take, candidates: IntArray
+) -> IntArray:
+    """The chosen, each exchanged for one that shows more, or moves less, if that serves as well."""
+    hidden = (~take.source.valid).sum(axis=1)[candidates]
+    speeds = _speeds(take)[candidates]
     chosen = chosen.copy()
     for slot in range(len(chosen)):
-        costs = choice.exchange_costs(chosen)[slot]
-        good = costs <= (1.0 + SLACK) * choice.cost(chosen)
+        costs = problem.exchange_costs(chosen)[slot]
+        good = costs <= (1.0 + SLACK) * problem.cost(chosen)
         if good.any():
             costs[~good | (hidden > hidden[good].min())] = np.inf
             alike = costs <= (1.0 + LEAST_GAIN) * costs.min()
@@ -182,7 +180,7 @@ def _preferred(choice: Choice, chosen: IntArray, take: Take, seen: IntArray) -> 
 
 
 def _speeds(take: Take) -> FloatArray:
-    """Of each frame, (T,): mean over what is seen both in the frame before and in that after."""
+    """The speed of each frame, (T,): mean over what both the frame before and that after show."""
     matrix, frames = take.source.matrix, np.arange(len(take))
     before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(take) - 1)
     moved = np.abs(matrix[after] - matrix[before])
@@ -190,9 +188,3 @@ def _speeds(take: Take) -> FloatArray:
     mean = np.where(there, moved, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
     seconds = np.maximum(take.time[after] - take.time[before], np.finfo(np.float64).tiny)
     return np.asarray(mean / seconds)
-
-
-def _shares(choice: Choice, chosen: IntArray) -> FloatArray:
-    near = np.column_stack([choice.distances[:, chosen], choice.covered])
-    counts = np.bincount(near.argmin(axis=1), minlength=len(chosen) + 1)
-    return np.asarray(counts[:-1] / len(near))

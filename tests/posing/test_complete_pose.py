@@ -92,7 +92,7 @@ def test_controls_are_held_by_name_or_pattern_unless_they_are_set(trained, start
 
 
 @pytest.mark.parametrize("corrected", [False, True])
-def test_values_far_from_every_known_pose_are_told(trained, start, caplog, corrected):
+def test_values_far_from_every_known_pose_are_warned_of(trained, start, caplog, corrected):
     facert.complete_pose(trained, {"jawOpen": 9.0}, start=start if corrected else None)
     assert "no known pose comes near" in caplog.text
 
@@ -109,7 +109,7 @@ def test_values_far_from_every_known_pose_are_told(trained, start, caplog, corre
         ({"jawOpen": 0.1}, {"samples": -1}, "samples: expected"),
     ],
 )
-def test_what_cannot_be_is_said(take, given, options, message):
+def test_what_cannot_be_is_refused(take, given, options, message):
     with pytest.raises(InputError, match=message):
         facert.complete_pose(replace(take, controls=LIMITED), given, **options)
 

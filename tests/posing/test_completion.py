@@ -113,7 +113,7 @@ def test_the_std_is_that_of_the_errors(completion):
     assert 1 / 1.5 < rms(poses[:, rest] - test[:, rest]) / rms(std[:, rest]) < 1.5
 
 
-def test_samples_have_the_mean_and_std_that_are_told(known):
+def test_samples_have_the_mean_and_std_that_are_predicted(known):
     free = Completion.learn(KnownPoses(known.poses, np.tile([-9.0, 9.0], (7, 1))), G)
     given = Given(G, known.poses[3, G])
     posed = free.pose(given, 4000, np.random.default_rng(0))
@@ -166,7 +166,7 @@ def test_the_std_grows_away_from_the_known_poses(known):
     assert spread[0] < spread[1] < spread[2]
 
 
-def test_what_never_moves_tells_nothing(known):
+def test_what_never_moves_predicts_nothing(known):
     poses = known.poses.copy()
     poses[:, 0] = 0.25
     still = Completion.learn(KnownPoses(poses, LIMITS), np.array([0, 1]))

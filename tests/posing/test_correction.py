@@ -19,8 +19,8 @@ def world():
     weights = rng.normal(size=(2, P))
     poses, truth = (rng.normal(size=(n, 2)) @ weights for n in (100, 200))
     poses += 0.05 * rng.normal(size=poses.shape)
-    said = truth + 0.3 * rng.normal(size=(200, 2)) @ weights
-    return KnownPoses(poses, FREE), truth, said
+    predicted = truth + 0.3 * rng.normal(size=(200, 2)) @ weights
+    return KnownPoses(poses, FREE), truth, predicted
 
 
 def corrected(known, start, values, soft=0.0, std=None, samples=0):
@@ -29,16 +29,18 @@ def corrected(known, start, values, soft=0.0, std=None, samples=0):
 
 
 def test_without_a_change_the_pose_stays(world):
-    known, _, said = world
-    np.testing.assert_allclose(corrected(known, said[0], said[0, G]).pose, said[0], atol=1e-12)
+    known, _, predicted = world
+    np.testing.assert_allclose(
+        corrected(known, predicted[0], predicted[0, G]).pose, predicted[0], atol=1e-12
+    )
 
 
 def test_the_corrections_are_met_and_mend_the_others(world):
-    known, truth, said = world
-    done = np.array([corrected(known, s, t[G]).pose for s, t in zip(said, truth, strict=True)])
+    known, truth, predicted = world
+    done = np.array([corrected(known, s, t[G]).pose for s, t in zip(predicted, truth, strict=True)])
     assert (done[:, G] == truth[:, G]).all()
     rest = np.setdiff1d(np.arange(P), G)
-    assert rms(done[:, rest] - truth[:, rest]) < 0.7 * rms(said[:, rest] - truth[:, rest])
+    assert rms(done[:, rest] - truth[:, rest]) < 0.7 * rms(predicted[:, rest] - truth[:, rest])
 
 
 @pytest.mark.parametrize("std", [None, np.full(P, 0.1)])
@@ -49,42 +51,43 @@ def test_where_no_known_pose_moves_the_others_stay(world, std):
 
 
 def test_a_control_without_error_moves_no_other(world):
-    known, _, said = world
+    known, _, predicted = world
     certain = np.where(np.isin(np.arange(P), G), 0.0, 0.1)
-    moved = corrected(known, said[0], said[0, G] + 0.1, std=certain).pose - said[0]
+    moved = corrected(known, predicted[0], predicted[0, G] + 0.1, std=certain).pose - predicted[0]
     np.testing.assert_allclose(moved, 0.1 * np.isin(np.arange(P), G), atol=1e-12)
 
 
 def test_twice_the_correction_moves_the_others_twice_as_far(world):
-    known, _, said = world
+    known, _, predicted = world
     once, twice = (
-        corrected(known, said[0], said[0, G] + step).pose - said[0] for step in (0.1, 0.2)
+        corrected(known, predicted[0], predicted[0, G] + step).pose - predicted[0]
+        for step in (0.1, 0.2)
     )
     np.testing.assert_allclose(twice, 2.0 * once, atol=1e-12)
 
 
 def test_what_the_model_is_sure_of_stays(world):
-    known, _, said = world
+    known, _, predicted = world
     std = np.full(P, 0.3)
     std[5] = 1e-6
-    moved = corrected(known, said[0], said[0, G] + 0.5, std=std).pose - said[0]
+    moved = corrected(known, predicted[0], predicted[0, G] + 0.5, std=std).pose - predicted[0]
     assert abs(moved[5]) < 1e-4 < np.abs(moved[[1, 2, 4]]).min()
 
 
 def test_corrections_leave_less_uncertainty_and_soft_ones_are_met_in_part(world):
-    known, _, said = world
+    known, _, predicted = world
     std = np.full(P, 0.3)
-    values = said[0, G] + 0.5
-    hard, soft = (corrected(known, said[0], values, s, std) for s in (0.0, 0.3))
+    values = predicted[0, G] + 0.5
+    hard, soft = (corrected(known, predicted[0], values, s, std) for s in (0.0, 0.3))
     assert (hard.std[G] == 0.0).all()
     assert (hard.std <= soft.std).all()
     assert (soft.std < std).all()
-    assert ((said[0, G] < soft.pose[G]) & (soft.pose[G] < values)).all()
+    assert ((predicted[0, G] < soft.pose[G]) & (soft.pose[G] < values)).all()
 
 
-def test_samples_spread_as_is_told(world):
-    known, _, said = world
-    posed = corrected(known, said[0], said[0, G] + 0.2, std=np.full(P, 0.3), samples=4000)
+def test_samples_spread_by_the_standard_deviation(world):
+    known, _, predicted = world
+    posed = corrected(known, predicted[0], predicted[0, G] + 0.2, std=np.full(P, 0.3), samples=4000)
     assert (posed.samples[:, G] == posed.pose[G]).all()
     np.testing.assert_allclose(posed.samples.std(axis=0), posed.std, rtol=0.1, atol=1e-12)
 
@@ -95,21 +98,21 @@ def held(known, start, values, held, soft=0.0):
 
 
 def test_what_is_held_stays_and_the_others_follow(world):
-    known, _, said = world
-    free = corrected(known, said[0], said[0, G] + 0.3)
+    known, _, predicted = world
+    free = corrected(known, predicted[0], predicted[0, G] + 0.3)
     for soft in (0.0, 0.1):
-        done = held(known, said[0], said[0, G] + 0.3, [1, 4], soft)
-        assert (done.pose[[1, 4]] == said[0, [1, 4]]).all()
-        assert (done.samples[:, [1, 4]] == said[0, [1, 4]]).all()
+        done = held(known, predicted[0], predicted[0, G] + 0.3, [1, 4], soft)
+        assert (done.pose[[1, 4]] == predicted[0, [1, 4]]).all()
+        assert (done.samples[:, [1, 4]] == predicted[0, [1, 4]]).all()
         assert (done.std[[1, 4]] == 0.0).all()
-        assert (np.abs(done.pose - said[0])[[2, 5]] > 1e-3).all()
-    assert (np.abs(free.pose - said[0])[[1, 4]] > 1e-3).all()
+        assert (np.abs(done.pose - predicted[0])[[2, 5]] > 1e-3).all()
+    assert (np.abs(free.pose - predicted[0])[[1, 4]] > 1e-3).all()
 
 
 def test_what_is_held_makes_nothing_of_the_others_more_certain(world):
-    known, _, said = world
-    free = corrected(known, said[0], said[0, G] + 0.3)
-    done = held(known, said[0], said[0, G] + 0.3, [1, 4])
+    known, _, predicted = world
+    free = corrected(known, predicted[0], predicted[0, G] + 0.3)
+    done = held(known, predicted[0], predicted[0, G] + 0.3, [1, 4])
     others = [0, 2, 3, 5]
     np.testing.assert_array_equal(done.pose[others], free.pose[others])
     np.testing.assert_array_equal(done.std[others], free.std[others])

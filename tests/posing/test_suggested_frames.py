@@ -102,7 +102,7 @@ def test_frames_that_are_held_still_are_preferred() -> None:
     assert (speed[chosen] == 0).all()
 
 
-def test_shares_tell_what_each_frame_stands_for(take: Take) -> None:
+def test_shares_are_of_the_frames_that_each_stands_for(take: Take) -> None:
     assert suggest_frames(take, COUNT).shares.sum() == pytest.approx(1.0)
     assert suggest_frames(take, COUNT, have=[0, 100]).shares.sum() < 1.0
 
@@ -133,7 +133,7 @@ def test_a_model_is_asked_where_it_is_uncertain(take: Take) -> None:
     assert std[chosen].mean() > std.mean()
 
 
-def test_what_a_model_learned_from_is_not_suggested_again_though_the_take_does_not_say_it(
+def test_what_a_model_learned_from_is_not_suggested_again_though_the_take_lacks_its_labels(
     take: Take, tmp_path
 ) -> None:
     """The recording goes on as it came from the camera; the labels are in another file."""
@@ -145,7 +145,7 @@ def test_what_a_model_learned_from_is_not_suggested_again_though_the_take_does_n
     np.testing.assert_array_equal(chosen, frames(bare, COUNT, have=model))
 
 
-def test_a_model_must_tell_how_certain_it_is(take: Take) -> None:
+def test_a_model_must_predict_how_certain_it_is(take: Take) -> None:
     model = facert.train(take, facert.Settings(method="ridge"))
     with pytest.raises(InputError, match="found ridge"):
         suggest_frames(take, COUNT, have=model)
