@@ -44,19 +44,31 @@ def float_array(value: ArrayLike, path: str) -> FloatArray:
     return array.astype(np.float64)
 
 
+def require_shape(
+    shape: tuple[int, ...], expected: tuple[int | str, ...], path: str, fix: str
+) -> None:
+    """Check the shape of an array; a letter stands for any size."""
+    sizes = zip(shape, expected, strict=False)
+    if len(shape) != len(expected) or any(s != e for s, e in sizes if isinstance(e, int)):
+        layout = f"({', '.join(map(str, expected))})"
+        whole = all(isinstance(size, int) for size in expected)
+        raise InputError(path, f"shape {layout}" if whole else layout, f"shape {shape}", fix)
+
+
+def require_finite(array: FloatArray, path: str, fix: str = "Check the export.") -> None:
+    """Refuse NaN and infinity."""
+    if not np.isfinite(array).all():
+        raise InputError(path, "finite numbers", "NaN or infinity", fix)
+
+
 def require_time(time: FloatArray, frames: int, fps: float) -> None:
     """Check the seconds of the frames and the nominal frame rate."""
     if time.shape != (frames,):
-        raise InputError(
-            "/time", f"{frames} seconds", f"shape {time.shape}", "Give one time a frame."
-        )
+        found, fix = f"shape {time.shape}", "Give one time a frame."
+        raise InputError("/time", f"{frames} seconds", found, fix)
     if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-        raise InputError(
-            "/time",
-            "finite, strictly rising seconds",
-            "a step back, a repeat or NaN",
-            "Sort the frames by time and drop repeats.",
-        )
+        expected, found = "finite, strictly rising seconds", "a step back, a repeat or NaN"
+        raise InputError("/time", expected, found, "Sort the frames by time and drop repeats.")
     if not (np.isfinite(fps) and fps > 0):
         raise InputError("fps", "a positive number", f"{fps}", "Set the frame rate.")
 
@@ -66,13 +78,10 @@ def checked_colours(value: ArrayLike | None, vertices: int) -> FloatArray | None
     if value is None:
         return None
     colours = float_array(value, "/colours")
-    if colours.shape != (vertices, 3) or not ((colours >= 0) & (colours <= 1)).all():
-        raise InputError(
-            "/colours",
-            f"({vertices}, 3) between 0 and 1",
-            f"shape {colours.shape}, or values outside",
-            "Give red, green and blue of every vertex, or leave the colours out.",
-        )
+    fix = "Give red, green and blue of every vertex, or leave the colours out."
+    require_shape(colours.shape, (vertices, 3), "/colours", fix)
+    if not ((colours >= 0) & (colours <= 1)).all():
+        raise InputError("/colours", "numbers between 0 and 1", "others", fix)
     return frozen(colours)
 
 

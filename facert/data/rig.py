@@ -17,7 +17,9 @@ from facert.data.arrays import (
     checked_names,
     float_array,
     frozen,
+    require_finite,
     require_plain,
+    require_shape,
     require_time,
     set_fields,
 )
@@ -52,23 +54,17 @@ class Mesh:
 
     def __post_init__(self) -> None:
         vertices = float_array(self.vertices, "/neutral")
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise InputError("/neutral", "(V, 3)", f"{vertices.shape}", "Give vertex positions.")
-        if not np.isfinite(vertices).all():
-            raise InputError("/neutral", "finite numbers", "NaN or infinity", "Check the export.")
+        require_shape(vertices.shape, ("V", 3), "/neutral", "Give vertex positions.")
+        require_finite(vertices, "/neutral")
         require_plain(self.units, "attribute units")
         faces = np.asarray(self.faces)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-            raise InputError(
-                "/faces", "integers (F, 3)", f"{faces.dtype} {faces.shape}", "Give triangles."
-            )
+            found = f"{faces.dtype} {faces.shape}"
+            raise InputError("/faces", "integers (F, 3)", found, "Give triangles.")
         if faces.size and not (0 <= faces.min() and faces.max() < len(vertices)):
-            raise InputError(
-                "/faces",
-                f"vertex indices 0 to {len(vertices) - 1}",
-                f"{faces.min()} to {faces.max()}",
-                "Check the export.",
-            )
+            expected = f"vertex indices 0 to {len(vertices) - 1}"
+            found = f"{faces.min()} to {faces.max()}"
+            raise InputError("/faces", expected, found, "Check the export.")
         colours = checked_colours(self.colours, len(vertices))
         set_fields(self, vertices=frozen(vertices), faces=frozen(faces.astype(np.int64)))
         set_fields(self, colours=colours)
@@ -140,15 +136,9 @@ class Rig:
     def __post_init__(self) -> None:
         mesh = Mesh(self.neutral, self.faces, self.units, self.colours)
         shapes = float_array(self.shapes, "/shapes")
-        if shapes.shape[1:] != mesh.vertices.shape:
-            raise InputError(
-                "/shapes",
-                f"(P, {len(mesh.vertices)}, 3)",
-                f"{shapes.shape}",
-                "Give one displacement a control and vertex.",
-            )
-        if not np.isfinite(shapes).all():
-            raise InputError("/shapes", "finite numbers", "NaN or infinity", "Check the export.")
+        fix = "Give one displacement a control and vertex."
+        require_shape(shapes.shape, ("P", *mesh.vertices.shape), "/shapes", fix)
+        require_finite(shapes, "/shapes")
         names = checked_names(self.names, len(shapes), "/names")
         set_fields(self, neutral=mesh.vertices, faces=mesh.faces, colours=mesh.colours)
         set_fields(self, shapes=frozen(shapes), names=names)

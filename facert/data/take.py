@@ -1,8 +1,7 @@
 """Takes: what was recorded of an actor, and the poses of a character in it.
 
 Plain frozen dataclasses. They check themselves when they are made and raise `InputError` naming
-the field by its path in the HDF5 layout; they know nothing of files. Arrays are float64 and are
-made read-only, so that a take can be shared without fear.
+the field by its path in the HDF5 layout. Arrays are float64 and read-only: a take can be shared.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from facert.data.arrays import (
     float_array,
     frozen,
     require_plain,
+    require_shape,
     require_time,
     set_fields,
 )
@@ -55,30 +55,19 @@ class Source:
     def __post_init__(self) -> None:
         values = float_array(self.values, "/source")
         if values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] != 3):
-            raise InputError(
-                "/source",
-                "markers (T, M, 3) or weights (T, D)",
-                f"shape {values.shape}",
-                "Write markers with three coordinates, or weights as a matrix.",
-            )
+            fix = "Write markers with three coordinates, or weights as a matrix."
+            expected = "markers (T, M, 3) or weights (T, D)"
+            raise InputError("/source", expected, f"shape {values.shape}", fix)
         path = "/source/markers" if values.ndim == 3 else "/source/weights"
         names = checked_names(self.names, values.shape[1], "/source/names")
         if np.isinf(values).any():
-            raise InputError(
-                path,
-                "finite numbers, or NaN for what was not observed",
-                "infinite values",
-                "Replace them by NaN.",
-            )
+            expected = "finite numbers, or NaN for what was not observed"
+            raise InputError(path, expected, "infinite values", "Replace them by NaN.")
         if values.ndim == 3:
             values[np.isnan(values).any(axis=2)] = np.nan
         if np.isnan(values).all():
-            raise InputError(
-                path,
-                "at least one observed value",
-                "NaN or invalid everywhere",
-                "Check the export.",
-            )
+            found = "NaN or invalid everywhere"
+            raise InputError(path, "at least one observed value", found, "Check the export.")
         if self.std is not None:
             frozen(self.std)
         set_fields(self, values=frozen(values), names=names)
@@ -127,13 +116,10 @@ class Controls:
         if self.limits is None:
             return
         limits = float_array(self.limits, "/target/limits")
-        if limits.shape != (len(names), 2) or not (limits[:, 0] <= limits[:, 1]).all():
-            raise InputError(
-                "/target/limits",
-                f"({len(names)}, 2), low <= high",
-                f"shape {limits.shape}" if limits.shape != (len(names), 2) else "low > high or NaN",
-                "Give the lowest and the highest value of each control.",
-            )
+        path, fix = "/target/limits", "Give the lowest and the highest value of each control."
+        require_shape(limits.shape, (len(names), 2), path, fix)
+        if not (limits[:, 0] <= limits[:, 1]).all():
+            raise InputError(path, "low <= high", "low > high or NaN", fix)
         set_fields(self, limits=frozen(limits))
 
 
@@ -197,28 +183,17 @@ class Take:
             return None
         path = "/animation/params" if name == "animation" else f"/target/{name}"
         if self.controls is None:
-            raise InputError(
-                "/target/names", "the controls' names", "none", "Write /target/names (P,)."
-            )
+            fix = "Write /target/names (P,)."
+            raise InputError("/target/names", "the controls' names", "none", fix)
         poses = float_array(value, path)
-        expected = (len(poses) if rows is None else rows, len(self.controls.names))
-        if poses.shape != expected:
-            raise InputError(
-                path,
-                f"shape {expected}",
-                f"{poses.shape}",
-                "Give one row a frame and one column a control.",
-            )
+        expected = ("n" if rows is None else rows, len(self.controls.names))
+        require_shape(poses.shape, expected, path, "Give a row a frame and a column a control.")
         known = ~np.isnan(poses)
         partial = np.flatnonzero(known.any(axis=1) & ~known.all(axis=1))
         if np.isinf(poses).any() or len(partial) or (name == "animation" and not known.all()):
             row = f"row {partial[0]} known in part" if len(partial) else "infinite or NaN values"
-            raise InputError(
-                path,
-                "whole finite poses (a row of NaN where a frame has none)",
-                row,
-                "Pose every control of the frame, or none.",
-            )
+            whole = "whole finite poses (a row of NaN where a frame has none)"
+            raise InputError(path, whole, row, "Pose every control of the frame, or none.")
         return frozen(poses)
 
     def __len__(self) -> int:

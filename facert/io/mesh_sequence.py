@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray, require_time
+from facert.data.arrays import FloatArray, IntArray, require_shape, require_time
 from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, reading
 from facert.io.hdf5 import GuardedFile, NewRows, create, open_guarded, stated_format
@@ -128,9 +128,7 @@ def _sequence(file: GuardedFile, path: Path) -> MeshSequence:
     neutral = file.mesh()
     time, rows = file.numbers("/time"), file.rows("/vertices")
     expected = (len(time), *neutral.vertices.shape)
-    if rows.shape != expected:
-        fix = "Write all vertices of every frame."
-        raise InputError("/vertices", f"shape {expected}", f"{rows.shape}", fix)
+    require_shape(rows.shape, expected, "/vertices", "Write all vertices of every frame.")
 
     def fetch(frames: IntArray) -> FloatArray:
         with reading(path):  # by then, other files may be open as well
@@ -144,9 +142,5 @@ def _sequence(file: GuardedFile, path: Path) -> MeshSequence:
 
 
 def _not_finite(frame: int) -> InputError:
-    return InputError(
-        "/vertices",
-        "finite numbers",
-        f"NaN or infinity in frame {frame}",
-        "Check the program that computed the vertices.",
-    )
+    found, fix = f"NaN or infinity in frame {frame}", "Check the program that computed them."
+    return InputError("/vertices", "finite numbers", found, fix)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, require_shape
 from facert.data.resampling import nominal_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
@@ -113,9 +113,8 @@ def open_archive(path: Path) -> Iterator[Archive]:
         try:
             file = zipfile.ZipFile(path)
         except _DAMAGED as error:
-            raise InputError(
-                "file", "an .npz archive", "something else", "Store it anew."
-            ) from error
+            found = "something else"
+            raise InputError("file", "an .npz archive", found, "Store it anew.") from error
         with file:
             yield Archive(file)
 
@@ -214,9 +213,8 @@ def _read_source(archive: Archive) -> Source:
     for key, names in _SOURCES.items():
         if key in archive:
             values = archive.numbers(key)
-            if values.ndim != (2 if key == "weights" else 3):
-                layout = "(T, D)" if key == "weights" else "(T, M, 3)"
-                raise InputError(key, layout, f"shape {values.shape}", "One row a frame.")
+            layout = ("T", "D") if key == "weights" else ("T", "M", "3")
+            require_shape(values.shape, layout, key, "One row a frame.")
             return Source(values, archive.names(names))
     there = ", ".join(archive.keys[:8]) or "nothing"
     raise InputError("keys", " or ".join(_SOURCES), there, "Store the source; see the layout.")
@@ -251,11 +249,7 @@ def _clock(archive: Archive, frames: int, fps: float | None) -> tuple[FloatArray
     elif "time" in archive:
         fps = nominal_rate(archive.numbers("time"))
     if not fps:
-        raise InputError(
-            "fps",
-            "the rate of the frames",
-            "none",
-            "Store fps, or run facert convert with --in-fps.",
-        )
+        fix = "Store fps, or run facert convert with --in-fps."
+        raise InputError("fps", "the rate of the frames", "none", fix)
     time = archive.numbers("time") if "time" in archive else np.arange(frames) / fps
     return time, fps

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import require_shape
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.io.hdf5 import TAKE_FORMAT, GuardedFile, NewFile, create, open_guarded
@@ -100,33 +100,17 @@ def write_take(
 def _read_source(file: GuardedFile) -> Source:
     kinds = [kind for kind in ("markers", "weights") if f"/source/{kind}" in file]
     if len(kinds) != 1:
-        raise InputError(
-            "/source",
-            "either /source/markers or /source/weights",
-            " and ".join(kinds) or "none of them",
-            "Write one of the two.",
-        )
-    path, dimensions = (f"/source/{kinds[0]}", 3 if kinds[0] == "markers" else 2)
+        expected, found = "either /source/markers or /source/weights", " and ".join(kinds)
+        raise InputError("/source", expected, found or "none of them", "Write one of the two.")
+    path = f"/source/{kinds[0]}"
     values = file.numbers(path)
-    if values.ndim != dimensions:
-        layout = "(T, M, 3)" if dimensions == 3 else "(T, D)"
-        raise InputError(path, layout, f"shape {values.shape}", "Write one row a frame.")
-    if "/source/valid" in file:
-        _apply_valid(values, file)
+    layout = ("T", "M", "3") if kinds[0] == "markers" else ("T", "D")
+    require_shape(values.shape, layout, path, "Write one row a frame.")
+    if "/source/valid" in file:  # False: not observed
+        valid, fix = file.flags("/source/valid"), "Give one flag a frame and marker or weight."
+        require_shape(valid.shape, values.shape[:2], "/source/valid", fix)
+        values[~valid] = np.nan
     return Source(values, file.names("/source/names"))
-
-
-def _apply_valid(values: FloatArray, file: GuardedFile) -> None:
-    """Set to NaN what was not observed by the file's flags."""
-    valid = file.flags("/source/valid")
-    if valid.shape != values.shape[:2]:
-        raise InputError(
-            "/source/valid",
-            f"shape {values.shape[:2]}",
-            f"{valid.shape}",
-            "Give one flag a frame and marker or weight.",
-        )
-    values[~valid] = np.nan
 
 
 def _read_controls(file: GuardedFile) -> Controls | None:

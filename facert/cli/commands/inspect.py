@@ -40,19 +40,17 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
         from facert.retarget.retargeter import load
 
         return {"kind": "model", **load(path).facts}
-    from dataclasses import asdict
-
-    from facert.data.summary import summarise
+    from facert.data.facts import facts_of
     from facert.io.formats import read_any, targets_of
     from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
     from facert.io.npz import NO_TARGET
 
     if holds_mesh_sequence(path):
         with open_mesh_sequence(path) as sequence:
-            return asdict(summarise(sequence))
+            return facts_of(sequence)
     targets = targets_of(path) if target is None else {}
     found = read_any(path, target=NO_TARGET if targets else target, shapes=shapes, fps=None)
-    facts = asdict(summarise(found))
+    facts = facts_of(found)
     if targets:
         console.log.info("several targets: --target shows one of them")
         facts["controls_of_targets"] = {name: len(controls) for name, controls in targets.items()}
