@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, Self
 
-import numpy as np
-
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.models.optim.base import Result
@@ -31,8 +29,8 @@ class Labelled:
 class Unlabelled:
     """Frames without a pose, X (m, d_x), and poses without a frame, Y (n, d_y), complete.
 
-    What is said of a frame is clipped to `bounds`, (2, d_y), infinite where nothing is; by default
-    to the range of all poses. A method may use that.
+    Predictions are clipped to `bounds`, (2, d_y), infinite where they are not; by default to the
+    range of all poses. A method may use that.
     """
 
     X: FloatArray
@@ -42,7 +40,7 @@ class Unlabelled:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a method says about T frames, in normalised units.
+    """Poses of T frames and what comes with them, in normalised units.
 
     Parameters
     ----------
@@ -59,10 +57,6 @@ class Prediction:
     X: FloatArray
 
 
-IN_TARGET_UNITS = ("training reconstruction", "error at poses left out")
-"""Figures of a report, or what they end in, that have the unit of normalised poses."""
-
-
 @dataclass(frozen=True)
 class Report:
     """How training went, for people and for the model file.
@@ -72,11 +66,14 @@ class Report:
     result : Result, optional
         Of the optimiser, where the method descends step by step.
     figures : mapping of str to float
-        What the method has to say of itself, e.g. kernel parameters.
+        Numbers by their names, e.g. kernel parameters.
+    pose_figures : mapping of str to float
+        Those that have the unit of normalised poses, e.g. errors.
     """
 
     result: Result | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
+    pose_figures: Mapping[str, float] = field(default_factory=dict)
 
 
 class Stream(Protocol):
@@ -137,7 +134,7 @@ class Method(Protocol):
     def on(self, device: str) -> Self:
         """The trained method, whose `predict` computes on a device, ``"cpu"`` or ``"cuda"``.
 
-        One that learns in one go stays on the CPU, and says so.
+        One that learns in one go stays on the CPU, with a warning.
 
         Raises
         ------
@@ -157,13 +154,3 @@ class Method(Protocol):
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned; raises InputError when shapes do not fit together."""
         ...
-
-
-def stack_predictions(predictions: list[Prediction]) -> Prediction:
-    """One prediction of all frames from one a frame."""
-    stds = [p.std for p in predictions if p.std is not None]
-    return Prediction(
-        np.concatenate([p.Y for p in predictions]),
-        np.concatenate(stds) if stds else None,
-        np.concatenate([p.X for p in predictions]),
-    )

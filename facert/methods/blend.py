@@ -31,7 +31,7 @@ from scipy.optimize import nnls
 
 from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray, rms
-from facert.methods.base import Labelled, Unlabelled
+from facert.methods.base import Labelled, Report, Unlabelled
 from facert.methods.factors import FactorMap
 from facert.methods.folds import ranked_folds
 from facert.methods.processes import Basis, FeatureProcess, ProcessBank
@@ -192,9 +192,7 @@ class Auto(Regression):
 
     map_type = BlendMap
 
-    def _learn(
-        self, labelled: Labelled, unlabelled: Unlabelled
-    ) -> tuple[BlendMap, dict[str, float]]:
+    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[BlendMap, Report]:
         poses, Y = np.vstack([labelled.Y, unlabelled.Y]), labelled.Y
         bounds = _bounds(unlabelled, poses)
         some = _fewer_poses(unlabelled, self.settings.seed)
@@ -204,7 +202,7 @@ class Auto(Regression):
         basis = Basis(maps.whitened.centre, maps.whitened.basis)
         missed = Labelled(labelled.X, Y - factors)
         residual = FeatureProcess.learn(missed, basis, np.zeros(Y.shape[1]))
-        corrected = np.clip(Y - residual.process.left_out_errors, *bounds)
+        corrected = np.clip(Y - residual.process.leave_one_out_errors, *bounds)
         shrinkage = Shrinkage.learn(poses, Y - factors)
         residual_shrinkage = Shrinkage.learn(poses, Y - corrected)
         said = [plain, whitened, shrinkage(factors), residual_shrinkage(corrected)]
@@ -223,8 +221,10 @@ class Auto(Regression):
         )
         counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
         shares = {f"weight of {n}": float(w) for n, w in zip(EXPERTS, weights, strict=True)}
-        missed_by_all = rms(np.tensordot(weights, np.array(errors), axes=1))
-        return made, {**counts, **shares, "error at poses left out": missed_by_all}
+        error = rms(np.tensordot(weights, np.array(errors), axes=1))
+        return made, Report(
+            figures={**counts, **shares}, pose_figures={"cross-validation error": error}
+        )
 
 
 def _bounds(unlabelled: Unlabelled, poses: FloatArray) -> FloatArray:

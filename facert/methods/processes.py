@@ -69,7 +69,7 @@ class ProcessMap(Map):
         return np.asarray(self.whitening @ (self.whitening.T @ self.Y))
 
     @property
-    def left_out_errors(self) -> FloatArray:
+    def leave_one_out_errors(self) -> FloatArray:
         """Each pose less what is predicted for it when it alone is left out, (n, d_y)."""
         return leave_one_out_errors(self.alpha, np.sum(self.whitening**2, axis=1))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -47,8 +47,8 @@ class Map(ArrayGroup, ABC):
 class Regression(ABC):
     """A method that learns a `Map`.
 
-    What a frame does not show is filled in first, by what all training frames tell of how the
-    source's dimensions go together; the cleaned source of a prediction is the filled one. What the
+    What a frame does not show is filled in first, from how the source's dimensions go together in
+    all training frames; the cleaned source of a prediction is the filled one. What the
     fill leaves open adds to the variance of a pose, as it would with the best linear stand-in for
     the map, y = const + x B: see `facert.models.gaussian.Gaussian.fill_for`.
 
@@ -66,7 +66,7 @@ class Regression(ABC):
     gaps_: Gaussian
     map_: Map
     response_: FloatArray
-    """B, (d_x, d_y); (d_x, 0) where the map tells no standard deviation."""
+    """B, (d_x, d_y); (d_x, 0) where the map predicts no standard deviation."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -120,14 +120,15 @@ class Regression(ABC):
         with threads_for(count):
             frames = np.vstack([labelled.X, unlabelled.X])
             self.gaps_ = Gaussian.of(frames)
-            self.map_, figures = self._learn(labelled, unlabelled)
+            self.map_, report = self._learn(labelled, unlabelled)
             self.response_ = self._linear_response(frames)
             residual = rms(self.map_(labelled.X)[0] - labelled.Y)
-        return Report(figures={**figures, "training reconstruction": residual})
+        errors = {**report.pose_figures, "training reconstruction": residual}
+        return replace(report, pose_figures=errors)
 
     @abstractmethod
-    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, dict[str, float]]:
-        """The map, and what to report of it."""
+    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, Report]:
+        """The map, and a report of it."""
 
     def _linear_response(self, frames: FloatArray) -> FloatArray:
         """B, least squares of the map's poses on frames (n, d_x); the ridge is the Gaussian's."""
@@ -208,12 +209,13 @@ class SupervisedRegression(Regression):
         self,
         labelled: Labelled,
         unlabelled: Unlabelled,  # noqa: ARG002  they only help to fill gaps
-    ) -> tuple[Map, dict[str, float]]:
-        return self._regress(labelled.X, labelled.Y)
+    ) -> tuple[Map, Report]:
+        map_, figures = self._regress(labelled.X, labelled.Y)
+        return map_, Report(figures=figures)
 
     @abstractmethod
     def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[Map, dict[str, float]]:
-        """The map from frames X (l, d_x) with poses Y (l, d_y), and what to report of it."""
+        """The map from frames X (l, d_x) with poses Y (l, d_y), and figures for the report."""
 
 
 class _FrameStream:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from facert.data.array_group import DAMAGED
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
@@ -112,7 +112,9 @@ class SemiSupervisedSGPLVM:
             fingerprint = _fingerprint(X, Y, self.settings)
             result = self._train(module, fingerprint, monitor or Monitor())
             self._set_views(module.source_posterior(X), module.target_posterior(Y))
-        return Report(result, self._figures(labelled, unlabelled))
+        residual = self.predict(labelled.X).Y - labelled.Y
+        errors = {"training reconstruction": rms(residual)}
+        return Report(result, self._figures(unlabelled), errors)
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
@@ -269,7 +271,7 @@ class SemiSupervisedSGPLVM:
             magnitude=float(module.entries),
         )
 
-    def _figures(self, labelled: Labelled, unlabelled: Unlabelled) -> dict[str, float]:
+    def _figures(self, unlabelled: Unlabelled) -> dict[str, float]:
         figures: dict[str, float] = {
             "unlabelled frames": len(unlabelled.X),
             "unlabelled poses": len(unlabelled.Y),
@@ -278,8 +280,6 @@ class SemiSupervisedSGPLVM:
         for view, posterior in (("source", self.source_), ("target", self.target_)):
             for index, value in enumerate(posterior.kernel.theta, start=1):
                 figures[f"{view} theta{index}"] = value
-        residual = self.predict(labelled.X).Y - labelled.Y
-        figures["training reconstruction"] = float(np.sqrt(np.mean(residual**2)))
         return figures
 
 

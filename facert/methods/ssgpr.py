@@ -15,7 +15,7 @@ import numpy as np
 
 from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray
-from facert.methods.base import Labelled, Unlabelled
+from facert.methods.base import Labelled, Report, Unlabelled
 from facert.methods.processes import Basis, FeatureProcess
 from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
@@ -45,12 +45,10 @@ class SemiSupervisedGPR(Regression):
 
     map_type = ShrunkProcess
 
-    def _learn(
-        self, labelled: Labelled, unlabelled: Unlabelled
-    ) -> tuple[ShrunkProcess, dict[str, float]]:
+    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[ShrunkProcess, Report]:
         frames = np.vstack([labelled.X, unlabelled.X])
         poses = np.vstack([labelled.Y, unlabelled.Y])
         process = FeatureProcess.learn(labelled, Basis.half_whitened(frames), poses.mean(axis=0))
-        shrinkage = Shrinkage.learn(poses, process.process.left_out_errors)
+        shrinkage = Shrinkage.learn(poses, process.process.leave_one_out_errors)
         counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
-        return ShrunkProcess(process, shrinkage), {k: float(v) for k, v in counts.items()}
+        return ShrunkProcess(process, shrinkage), Report(figures=counts)

@@ -8,7 +8,7 @@ with C_ij their cross-covariance, p_i their mean positions, and R the RV coeffic
 Escoufier 1976), which knows neither the direction nor the size of a motion. The normalised cut of
 Shi and Malik (2000) parts them: the second eigenvector of the normalised Laplacian orders the
 markers, and the best cut along this order is taken. The order is smoothed to a plane through the
-face, so that no marker strays to the other group. No pose is looked at: a hundred frames tell how
+face, so that no marker strays to the other group. No pose is looked at: a hundred frames show how
 markers go together, ten labels hardly do.
 """
 
@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.models.kernels import squared_exponential
 
 TIED = 0.05  # ε: near markers are tied a little, even where noise hides how they move
 NEIGHBOUR = 3  # h is twice the median distance to the neighbour of this rank
@@ -72,7 +73,7 @@ def _nearness(places: FloatArray) -> FloatArray:
     """exp(-|p_i - p_j|² / 2h²), (M, M)."""
     squared = np.sum((places[:, None] - places) ** 2, axis=2)
     h = 2.0 * np.sqrt(np.median(np.sort(squared, axis=1)[:, NEIGHBOUR]))
-    return np.asarray(np.exp(-squared / max(2.0 * h**2, np.finfo(np.float64).tiny)))
+    return squared_exponential(squared, 1.0, 1.0 / max(h**2, np.finfo(np.float64).tiny))
 
 
 def _order(ties: FloatArray) -> FloatArray:

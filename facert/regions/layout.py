@@ -13,14 +13,14 @@ from facert.data.take import Source
 from facert.errors import InputError
 from facert.methods.noise import with_noise
 from facert.preprocess.preparation import TrainingData
-from facert.regions.label_errors import left_out_errors
-from facert.regions.regional import Layout
+from facert.regions.automatic import label_errors
+from facert.regions.regional import RegionLayout
 from facert.settings import Settings
 
 FAULTLESS = 1e-9  # least error of a region, relative to the variance of the control
 
 
-def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> Layout:
+def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> RegionLayout:
     """The layout of regions.
 
     Those that share a control have a weight in it by how well their markers predict it: the
@@ -54,7 +54,7 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> Layout:
         noise.append([expected.sigma_c, expected.source_noise_floor])
         trust.append(1.0 / _errors(data, seen))
     shares = members * np.array(trust)
-    return Layout(
+    return RegionLayout(
         columns=columns.astype(np.float64),
         weights=shares / shares.sum(axis=0),
         units=np.array(units),
@@ -63,9 +63,9 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> Layout:
 
 
 def _errors(data: TrainingData, seen: BoolArray) -> FloatArray:
-    """How badly some columns predict each control, (P,); above 0."""
+    """The error of predicting each control from some columns, (P,); above 0."""
     frames, labelled = (X.compress(seen, axis=1) for X in (data.complete, data.chosen.X_labelled))
-    found = left_out_errors(frames, labelled, data.chosen.poses[: len(labelled)])
+    found = label_errors(frames, labelled, data.chosen.poses[: len(labelled)])
     return np.maximum(found, FAULTLESS)
 
 
@@ -76,7 +76,7 @@ def _columns(region: Region, source: Source) -> BoolArray:
 
 
 def _units(values: FloatArray, field: str) -> Normalisation:
-    """Of a region; raises InputError when nothing moves there."""
+    """Units of a region's values; raises InputError when nothing moves there."""
     try:
         return Normalisation.of(values, field)
     except InputError as error:
@@ -85,7 +85,7 @@ def _units(values: FloatArray, field: str) -> Normalisation:
 
 
 def _in_unit(settings: Settings, unit: float) -> Settings:
-    """Noise that the settings tell, in units of the face, in those of a region."""
+    """The settings with their noise in the units of a region instead of the face's."""
     sigma_c, floor = settings.sigma_c, settings.source_noise_floor
     return replace(
         settings,

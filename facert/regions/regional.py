@@ -1,10 +1,11 @@
 """A method for each region of the face, blended where a control belongs to several.
 
-A region's method never sees the rest of the face: whatever its controls do, its own markers say so.
-It works in units of its own, those that it would have if the region were all there is: a lid is to
+A region's method never sees the rest of the face: its controls follow its own markers alone. It
+works in units of its own, those that it would have if the region were all there is: a lid is to
 its region what a jaw is to the face.
 
-With w_rc the weight of region r in control c, which sum to 1, and y_rc, s_rc what the region says,
+With w_rc the weight of region r in control c, which sum to 1, and y_rc, s_rc the region's
+prediction,
 
     y_c = Σ_r w_rc y_rc,      s_c² = Σ_r w_rc s_rc²,
 
@@ -26,15 +27,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import MOST
 from facert.errors import InputError
-from facert.methods.base import (
-    IN_TARGET_UNITS,
-    Labelled,
-    Method,
-    Prediction,
-    Report,
-    Stream,
-    Unlabelled,
-)
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
 from facert.methods.registry import make_method
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
@@ -43,7 +36,7 @@ WHOLE = 1e-9  # by which the weights of a control may miss 1
 
 
 @dataclass(frozen=True, eq=False)
-class Layout(ArrayGroup):
+class RegionLayout(ArrayGroup):
     """What each of r regions sees and moves, in columns of normalised arrays.
 
     Parameters
@@ -83,7 +76,7 @@ class Layout(ArrayGroup):
 
 
 @dataclass(frozen=True)
-class _Part:
+class _RegionMethod:
     """One region: its method, what of the face it sees and moves, and its units."""
 
     method: Method
@@ -107,16 +100,15 @@ class _Part:
             return self._frames(X), None
         return self._frames(X), input_variance.take(self.columns, axis=1) / self.source_unit**2
 
-    def figures(self, report: Report) -> dict[str, float]:
-        """Of the region's report, in the units of the face."""
-        unit = self.target_unit
-        return {n: v * unit if n in IN_TARGET_UNITS else v for n, v in report.figures.items()}
+    def pose_figures(self, report: Report) -> dict[str, float]:
+        """Errors that the region reports, in the units of the face."""
+        return {name: value * self.target_unit for name, value in report.pose_figures.items()}
 
-    def in_face_units(self, said: Prediction) -> Prediction:
-        std = None if said.std is None else said.std * self.target_unit
-        return Prediction(said.Y * self.target_unit, std, said.X * self.source_unit)
+    def in_face_units(self, own: Prediction) -> Prediction:
+        std = None if own.std is None else own.std * self.target_unit
+        return Prediction(own.Y * self.target_unit, std, own.X * self.source_unit)
 
-    def begin_at(self, old: _Part, source: Normalisation, target: Normalisation) -> None:
+    def begin_at(self, old: _RegionMethod, source: Normalisation, target: Normalisation) -> None:
         """Of the units, given for the face, only what the region sees and moves counts."""
         self.method.begin_at(
             old.method,
@@ -140,14 +132,14 @@ class Regional:
     ----------
     settings : Settings
         With regions, for their names.
-    layout : Layout, optional
+    layout : RegionLayout, optional
         Of the same regions in the same order; `load` finds it in the file.
     """
 
     most_unlabelled: ClassVar[int | None] = None
     stepwise: ClassVar[bool] = False
 
-    def __init__(self, settings: Settings, layout: Layout | None = None) -> None:
+    def __init__(self, settings: Settings, layout: RegionLayout | None = None) -> None:
         self.settings = settings
         if layout is not None:
             self._set_layout(layout)
@@ -167,7 +159,7 @@ class Regional:
         self,
         labelled: Labelled,
         unlabelled: Unlabelled,
-        monitor: Monitor | None = None,  # noqa: ARG002  it could not tell one region from another
+        monitor: Monitor | None = None,  # noqa: ARG002  regions would look alike to it
     ) -> Report:
         """Train the method of each region on its part of the data.
 
@@ -183,18 +175,21 @@ class Regional:
         KeyboardInterrupt
             When the training of a region was interrupted: the others have none.
         """
-        told = []
+        reports = []
         for part in self.parts_:
             report = part.method.fit(part.labelled(labelled), part.unlabelled(unlabelled))
             if report.result is not None and report.result.status == "interrupted":
                 raise KeyboardInterrupt
-            told.append(part.figures(report))
-        return Report(figures=_together(self._names, told))
+            reports.append(report)
+        errors = [part.pose_figures(r) for part, r in zip(self.parts_, reports, strict=True)]
+        figures = [report.figures for report in reports]
+        names = self._names
+        return Report(figures=_together(names, figures), pose_figures=_together(names, errors))
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""
-        said = [part.method.predict(*part.observed(frames, input_variance)) for part in self.parts_]
-        return self._blend(said, frames)
+        own = [part.method.predict(*part.observed(frames, input_variance)) for part in self.parts_]
+        return self._blend(own, frames)
 
     def on(self, device: str) -> Self:
         """The same with every region's method on the device; see `Method.on`."""
@@ -222,7 +217,7 @@ class Regional:
             When an array is absent or the shapes do not fit together.
         """
         try:
-            self._set_layout(Layout.of(arrays, "layout."))
+            self._set_layout(RegionLayout.of(arrays, "layout."))
         except KeyError as error:
             raise InputError("method", "regions", f"no {error.args[0]}", DAMAGED) from None
         for index, part in enumerate(self.parts_):
@@ -239,30 +234,30 @@ class Regional:
         regions = self.settings.regions
         return [] if regions is None or isinstance(regions, str) else regions.names
 
-    def _set_layout(self, layout: Layout) -> None:
+    def _set_layout(self, layout: RegionLayout) -> None:
         if len(layout.columns) != len(self._names):
             expected, found = f"{len(self._names)} regions", f"{len(layout.columns)}"
             raise InputError("layout", expected, found, DAMAGED)
         self.layout_ = layout
         self.parts_ = [self._part(index) for index in range(len(layout.columns))]
 
-    def _part(self, index: int) -> _Part:
+    def _part(self, index: int) -> _RegionMethod:
         layout = self.layout_
         sigma_c, floor = layout.noise[index].tolist()
         own = replace(self.settings, regions=None, sigma_c=sigma_c, source_noise_floor=floor)
-        return _Part(
+        return _RegionMethod(
             make_method(own),
             np.flatnonzero(layout.columns[index]),
             np.flatnonzero(layout.weights[index]),
             *layout.units[index].tolist(),
         )
 
-    def _blend(self, said: Sequence[Prediction], frames: FloatArray) -> Prediction:
-        """What regions say of frames (T, d_x); what none sees of the source stays as it is."""
+    def _blend(self, predictions: Sequence[Prediction], frames: FloatArray) -> Prediction:
+        """One prediction of frames (T, d_x); what no region sees of the source stays as it is."""
         poses = np.zeros((len(frames), self.layout_.weights.shape[1]))
         variances, seen = np.zeros_like(poses), np.zeros_like(frames)
-        tells_std = all(prediction.std is not None for prediction in said)
-        for part, weights, own in zip(self.parts_, self.layout_.weights, said, strict=True):
+        has_std = all(prediction.std is not None for prediction in predictions)
+        for part, weights, own in zip(self.parts_, self.layout_.weights, predictions, strict=True):
             face, w = part.in_face_units(own), weights[part.controls]
             poses[:, part.controls] += w * face.Y
             seen[:, part.columns] += face.X
@@ -270,10 +265,10 @@ class Regional:
                 variances[:, part.controls] += w * face.std**2
         eyes = self.layout_.columns.sum(axis=0)
         source = np.where(eyes > 0, seen / np.maximum(eyes, 1.0), frames)
-        return Prediction(poses, np.sqrt(variances) if tells_std else None, source)
+        return Prediction(poses, np.sqrt(variances) if has_std else None, source)
 
 
-def untrained_method(settings: Settings, layout: Layout | None = None) -> Method:
+def untrained_method(settings: Settings, layout: RegionLayout | None = None) -> Method:
     """The method of the settings; with regions, one that has it for each of them.
 
     Without a layout, a regional method is ready for `Method.load` alone.
@@ -296,20 +291,20 @@ class _RegionalStream:
     def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
         parts = zip(self.streams, self.method.parts_, strict=True)
-        said = [stream.step(*part.observed(frame, input_variance)) for stream, part in parts]
-        return self.method._blend(said, frame)
+        own = [stream.step(*part.observed(frame, input_variance)) for stream, part in parts]
+        return self.method._blend(own, frame)
 
 
 def _together(names: Sequence[str], regions: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """What all regions have in common once, the rest under the names of the regions."""
+    """Figures that all regions have in common once, the rest under the names of the regions."""
     first, *others = regions
     common = {
         name: value for name, value in first.items() if all(o.get(name) == value for o in others)
     }
     own = {
         f"{name}: {figure}": value
-        for name, told in zip(names, regions, strict=True)
-        for figure, value in told.items()
+        for name, figures in zip(names, regions, strict=True)
+        for figure, value in figures.items()
         if figure not in common
     }
     return {**common, **own}

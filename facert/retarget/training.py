@@ -11,7 +11,6 @@ from facert.data.normalisation import Normalisation
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError
-from facert.methods.base import IN_TARGET_UNITS
 from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.motion.estimate import Estimate
@@ -132,7 +131,5 @@ def _figures(learned: Learned, labels: int, target_units: Normalisation) -> dict
             "status": result.status,
         }
     unit = target_units.scale  # of errors, so that they compare with those of retargeting
-    return figures | {
-        name: value * unit if name.endswith(IN_TARGET_UNITS) else value
-        for name, value in learned.report.figures.items()
-    }
+    errors = {name: value * unit for name, value in learned.report.pose_figures.items()}
+    return figures | dict(learned.report.figures) | errors

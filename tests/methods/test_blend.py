@@ -84,7 +84,7 @@ def test_the_error_that_is_told_is_about_the_true_one():
     method = Auto(Settings())
     report = method.fit(labelled, unlabelled)
     true = rms(method.predict(test.X).Y - test.Y)
-    assert 0.7 * true < report.figures["error at poses left out"] < 1.4 * true
+    assert 0.7 * true < report.pose_figures["cross-validation error"] < 1.4 * true
 
 
 def test_the_report_names_experts_and_what_was_used():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from facert.models.whitening import whitening
-from facert.regions.label_errors import FREE, POWER, RIDGE, left_out_errors
+from facert.regions.automatic import FREE, POWER, RIDGE, label_errors
 
 
 def make_data(seed=0, labels=9):
@@ -25,20 +25,20 @@ def test_each_label_is_predicted_from_the_others():
         inside = K[np.ix_(rest, rest)] + RIDGE * np.eye(rest.sum())
         errors[i] = Y[i] - K[i, rest] @ np.linalg.solve(inside, Y[rest])
     expected = (errors**2).sum(axis=0) / (Y**2).sum(axis=0)
-    np.testing.assert_allclose(left_out_errors(frames, labelled, poses), expected, rtol=1e-9)
+    np.testing.assert_allclose(label_errors(frames, labelled, poses), expected, rtol=1e-9)
 
 
 def test_neither_unit_nor_origin_matters():
     frames, labelled, poses = make_data()
-    moved = left_out_errors(25.4 * frames + 100.0, 25.4 * labelled + 100.0, 0.01 * poses - 3.0)
-    np.testing.assert_allclose(moved, left_out_errors(frames, labelled, poses), rtol=1e-6)
+    moved = label_errors(25.4 * frames + 100.0, 25.4 * labelled + 100.0, 0.01 * poses - 3.0)
+    np.testing.assert_allclose(moved, label_errors(frames, labelled, poses), rtol=1e-6)
 
 
 def test_what_never_moves_tells_nothing():
     frames, labelled, poses = make_data()
     poses[:, 2] = 0.3
-    assert left_out_errors(frames, labelled, poses)[2] == 1.0
-    still = left_out_errors(np.ones_like(frames), np.ones_like(labelled), poses)
+    assert label_errors(frames, labelled, poses)[2] == 1.0
+    still = label_errors(np.ones_like(frames), np.ones_like(labelled), poses)
     np.testing.assert_array_equal(still, 1.0)
-    nothing = left_out_errors(frames[:, :0], labelled[:, :0], poses)
+    nothing = label_errors(frames[:, :0], labelled[:, :0], poses)
     np.testing.assert_array_equal(nothing, 1.0)

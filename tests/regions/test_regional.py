@@ -9,7 +9,7 @@ import facert
 from facert import InputError, Settings
 from facert.data.regions import Region, Regions
 from facert.methods.registry import REGISTRY
-from facert.regions.regional import Layout, Regional
+from facert.regions.regional import Regional, RegionLayout
 from facert.retarget.options import AS_IT_IS
 
 every_method = pytest.mark.parametrize("name", REGISTRY)
@@ -210,9 +210,9 @@ GOOD = {
     ],
 )
 def test_a_damaged_layout_is_refused(name, bad):
-    Layout(**GOOD)
+    RegionLayout(**GOOD)
     with pytest.raises(InputError, match="train it again"):
-        Layout(**{**GOOD, name: bad})
+        RegionLayout(**{**GOOD, name: bad})
 
 
 def test_a_damaged_model_is_refused(trained):
@@ -234,7 +234,7 @@ def test_errors_of_the_regions_are_told_in_the_units_of_the_controls(take, train
     percent = replace(take, params=100.0 * take.params, animation=100.0 * take.animation)
     by_percent = facert.train(percent, Settings(method="auto", regions=TWO, **QUICK)).figures
     figures = trained("auto").figures
-    told = [name for name in figures if "error at poses left out" in name]
+    told = [name for name in figures if "cross-validation error" in name]
     assert [name.split(":")[0] for name in told] == ["lower", "upper"]
     for name in told:
         assert by_percent[name] == pytest.approx(100.0 * figures[name], rel=1e-6)
