@@ -23,7 +23,7 @@ import numpy as np
 from experiments.grid import ACROSS, DEFAULT, OPTICAL, Case, begin_log, evaluate, kinds, options
 from experiments.report import markdown, write_csv, write_text
 from experiments.verdict import Cell, common_others, judge, lead, mean_ratio
-from facert.evaluation.comparison import Estimate, errors_by_method
+from facert.evaluation.paired import MeanWithError, errors_by_method
 from facert.evaluation.run import Grid
 
 LABELS = (10, 15, 20, 30, 40)
@@ -191,7 +191,7 @@ def records(cells: Sequence[Cell]) -> list[dict[str, object]]:
     lines: list[dict[str, object]] = []
     for cell in cells:
         for method, errors in cell.errors.items():
-            mean = Estimate.of(errors)
+            mean = MeanWithError.of(errors)
             difference, ratio = cell.difference(method), cell.ratio(method)
             lines.append(
                 {

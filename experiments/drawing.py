@@ -14,7 +14,7 @@ from PIL import Image
 
 from experiments.grid import DEFAULT
 from facert.evaluation.figures import COLOURS, INK, NAMES, Axis
-from facert.evaluation.summary import Row
+from facert.evaluation.table import EvaluationRow
 from facert.io.atomic import replacing
 from facert.methods.registry import REGISTRY
 
@@ -30,15 +30,15 @@ class Panel:
     Parameters
     ----------
     title : str
-    rows : sequence of Row
+    rows : sequence of EvaluationRow
         They differ in method and in the number on the x axis.
-    references : sequence of Row
+    references : sequence of EvaluationRow
         Methods for which that number means nothing: a horizontal line each.
     """
 
     title: str
-    rows: Sequence[Row]
-    references: Sequence[Row] = ()
+    rows: Sequence[EvaluationRow]
+    references: Sequence[EvaluationRow] = ()
 
 
 def draw_panels(panels: Sequence[Panel], axis: Axis, title: str) -> Figure:
@@ -123,7 +123,7 @@ def _draw(axes: Axes, panel: Panel, axis: Axis) -> None:
     axes.tick_params(colors=INK, labelsize=8)
 
 
-def rms_of(row: Row) -> float:
+def rms_of(row: EvaluationRow) -> float:
     """Of a method that could run."""
     assert row.rms is not None  # others are not drawn
     return row.rms

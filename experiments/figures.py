@@ -22,7 +22,7 @@ from experiments.drawing import Panel, draw_panels, rms_of, save
 from experiments.grid import Case, begin_log, evaluate, kinds, options
 from experiments.report import markdown, write_csv, write_text
 from facert.evaluation.run import Grid
-from facert.evaluation.summary import Row, best, summarise
+from facert.evaluation.table import EvaluationRow, best, summarise
 
 LABELS = (10, 20, 30, 40)
 FEWEST = LABELS[0]
@@ -37,9 +37,9 @@ class Curves:
     """The means of a problem: rows of both figures, and the supervised methods of Figure 5."""
 
     case: Case
-    labels: Sequence[Row]
-    unlabelled: Sequence[Row]
-    references: Sequence[Row]
+    labels: Sequence[EvaluationRow]
+    unlabelled: Sequence[EvaluationRow]
+    references: Sequence[EvaluationRow]
 
 
 def measure(case: Case, given: Namespace) -> Curves:
@@ -47,7 +47,7 @@ def measure(case: Case, given: Namespace) -> Curves:
     semi = tuple(method for method in given.methods if method in SEMI_SUPERVISED)
     grid = Grid(tuple(given.methods), LABELS, (USUAL,), given.repeats)
     by_labels = summarise(evaluate(case, grid, given.jobs), case.protocol)
-    by_unlabelled: list[Row] = []
+    by_unlabelled: list[EvaluationRow] = []
     if semi:
         grid = Grid(semi, (FEWEST,), UNLABELLED, given.repeats)
         by_unlabelled = summarise(evaluate(case, grid, given.jobs), case.protocol)
@@ -104,7 +104,7 @@ def figure_5(curves: Sequence[Curves], repeats: int, folder: Path) -> None:
     write_text(folder / "figure5.md", parts)
 
 
-def _table(rows: Sequence[Row], name: str, number: Callable[[Row], int]) -> str:
+def _table(rows: Sequence[EvaluationRow], name: str, number: Callable[[EvaluationRow], int]) -> str:
     """Methods by rising mean, down; the number across."""
     numbers = sorted({number(row) for row in rows})
     found = {(row.method, number(row)): row for row in rows}
@@ -117,21 +117,21 @@ def _table(rows: Sequence[Row], name: str, number: Callable[[Row], int]) -> str:
     return markdown([name, *map(str, numbers)], lines)
 
 
-def _cell(row: Row | None, bold: bool) -> str:
+def _cell(row: EvaluationRow | None, bold: bool) -> str:
     if row is None:
         return "-"
     text = f"{rms_of(row):.4f}" + (f" ± {row.rms_se:.4f}" if row.rms_se is not None else "")
     return f"**{text}**" if bold else text
 
 
-def _ranked(rows: Sequence[Row]) -> list[str]:
+def _ranked(rows: Sequence[EvaluationRow]) -> list[str]:
     def mean(method: str) -> float:
         return float(np.mean([np.log(rms_of(row)) for row in rows if row.method == method]))
 
     return sorted({row.method for row in rows}, key=mean)
 
 
-def _overall(problems: Sequence[Sequence[Row]]) -> str:
+def _overall(problems: Sequence[Sequence[EvaluationRow]]) -> str:
     """Geometric means of the ratio to the best, method by method."""
     rows = [row for problem in problems for row in problem]
 
@@ -148,11 +148,11 @@ def _overall(problems: Sequence[Sequence[Row]]) -> str:
     return markdown(["labels", *map(str, LABELS), "all"], lines)
 
 
-def _measured(rows: Sequence[Row]) -> list[Row]:
+def _measured(rows: Sequence[EvaluationRow]) -> list[EvaluationRow]:
     return [row for row in rows if row.rms is not None]
 
 
-def _record(case: Case, row: Row) -> dict[str, object]:
+def _record(case: Case, row: EvaluationRow) -> dict[str, object]:
     """A line of the CSV file."""
     values = {name: value for name, value in asdict(row).items() if name not in LEFT_OUT}
     problem = {"track": case.track, "target": case.target, "split": case.split}

@@ -33,7 +33,7 @@ from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.names import control_groups
 from facert.data.regions import AUTO
-from facert.evaluation.comparison import Estimate, paired_ratio
+from facert.evaluation.paired import MeanWithError, paired_ratio
 from facert.io.journal import Journal, source_digest
 from facert.retarget.options import AS_IT_IS
 
@@ -174,7 +174,7 @@ class Cell:
         kept = table[~np.isnan(table).any(axis=1)]
         return np.asarray(kept[:, 0 if way == WHOLE else 1])
 
-    def ratio(self, score: str) -> Estimate | None:
+    def ratio(self, score: str) -> MeanWithError | None:
         """Regions over the whole; None where fewer than two draws have the score."""
         whole, apart = self.values(WHOLE, score), self.values(APART, score)
         return paired_ratio(apart, whole) if len(whole) > 1 else None
@@ -233,7 +233,7 @@ def _numbers(values: dict[str, float | None]) -> dict[str, float]:
     return {name: float("nan") if value is None else value for name, value in values.items()}
 
 
-def _told(ratio: Estimate | None) -> str:
+def _told(ratio: MeanWithError | None) -> str:
     return "" if ratio is None else f"{ratio.value:.3f} ± {ratio.se:.3f}"
 
 
@@ -260,7 +260,7 @@ def summary(found: Sequence[Cell]) -> str:
     return markdown(header, lines, texts=2)
 
 
-def _mean(ratios: Sequence[Estimate]) -> str:
+def _mean(ratios: Sequence[MeanWithError]) -> str:
     """Mean ratio, with the error that those of the cells leave it."""
     if not ratios:
         return ""

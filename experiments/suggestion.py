@@ -24,7 +24,7 @@ from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import read_track
 from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray, rms
-from facert.evaluation.comparison import Estimate, paired_ratio
+from facert.evaluation.paired import MeanWithError, paired_ratio
 from facert.posing.suggested_frames import suggest_frames
 from facert.retarget.options import AS_IT_IS
 
@@ -109,7 +109,7 @@ class Cell:
     labels: int
     errors: dict[str, FloatArray]
 
-    def ratio(self, choice: str) -> Estimate:
+    def ratio(self, choice: str) -> MeanWithError:
         """Of the mean RMS to that of random frames."""
         return paired_ratio(self.errors[choice], self.errors[RANDOM])
 
@@ -188,8 +188,8 @@ def records(cells: Sequence[Cell]) -> list[dict[str, object]]:
             "labels": cell.labels,
             "choice": choice,
             "repeats": len(errors),
-            "rms": Estimate.of(errors).value,
-            "rms_se": Estimate.of(errors).se,
+            "rms": MeanWithError.of(errors).value,
+            "rms_se": MeanWithError.of(errors).se,
             "over_random": cell.ratio(choice).value,
             "over_random_se": cell.ratio(choice).se,
         }

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.grid import DEFAULT, Case
 from facert.data.arrays import FloatArray
-from facert.evaluation.comparison import Estimate, paired_ratio
+from facert.evaluation.paired import MeanWithError, paired_ratio
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Cell:
         names = [method for method in self.errors if method != DEFAULT]
         return sorted(names, key=lambda method: float(self.errors[method].mean()))
 
-    def ratio(self, other: str) -> Estimate:
+    def ratio(self, other: str) -> MeanWithError:
         """The default's mean RMS over that of another method."""
         return paired_ratio(self.errors[DEFAULT], self.errors[other])
 
-    def difference(self, other: str) -> Estimate:
+    def difference(self, other: str) -> MeanWithError:
         """The default's mean RMS less that of another method."""
-        return Estimate.of(self.errors[DEFAULT] - self.errors[other])
+        return MeanWithError.of(self.errors[DEFAULT] - self.errors[other])
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def mean_ratio(cells: Sequence[Cell], method: str) -> float:
     return float(np.mean([cell.ratio(method).value for cell in cells]))
 
 
-def lead(cells: Sequence[Cell], method: str) -> Estimate:
+def lead(cells: Sequence[Cell], method: str) -> MeanWithError:
     """Mean over cells and draws of log(default / method); the error is that between the draws."""
     logs = [np.log(cell.errors[DEFAULT] / cell.errors[method]) for cell in cells]
-    return Estimate.of(np.mean(logs, axis=0))
+    return MeanWithError.of(np.mean(logs, axis=0))

@@ -18,7 +18,7 @@ OptimiserName = Literal["lbfgs", "scg"]
 LimitRule = Literal["auto", "declared", "none"]
 Likelihood = Literal["auto", "exact", "vfe", "fitc"]
 
-EVERYDAY, SHARED, FINE = "Settings", "Settings of the shared models", "In a config file alone"
+EVERYDAY, SHARED, FINE = "Options", "Shared models", "In a config file alone"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Settings:
     divided by the largest standard deviation of one of its dimensions.
     """
 
-    method: Annotated[str, About("What learns: a name in the registry of methods.")] = "auto"
+    method: Annotated[str, About("The method that learns.")] = "auto"
     labels: Annotated[
         int | None, About("Use only so many of the posed frames, at random.", least=0, unset="all")
     ] = None

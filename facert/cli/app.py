@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
+from types import ModuleType
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from facert.cli.commands import (
     clean,
@@ -34,13 +34,14 @@ from facert.cli.commands import (
     view,
 )
 from facert.cli.shared import console
+from facert.cli.shared.help import Command, Group
 from facert.data.version import CREATED_BY
 from facert.errors import FacertError
 
 ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")
 
 
-class _Commands(TyperGroup):
+class _Commands(Group):
     """Typer ends without a word at Ctrl-C; the exit status is the one that shells expect."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -80,34 +81,43 @@ def options(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Only warnings and errors.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details as well.")] = False,
     _version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True)
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
     ] = False,
 ) -> None:
     """Options before or after the command."""
     console.configure(quiet, verbose)
 
 
-app.command("suggest")(suggest.command)
-app.command("train")(train.command)
-app.command("regions")(regions.command)
-app.command("retarget")(retarget.command)
-app.command("live")(live.command)
-app.command("pose")(pose.command)
-app.command("propagate")(propagate.command)
-app.command("drive")(drive.command)
-app.add_typer(points.app, name="points")
-app.command("stabilise")(stabilise.command)
-app.command("clean")(clean.command)
-app.command("convert")(convert.command)
-app.command("export-script")(export_script.command)
-app.command("inspect")(inspect.command)
-app.command("simulate")(simulate.command)
-app.command("demo")(demo.command)
-app.command("view")(view.command)
-app.command("render")(render.command)
-app.command("plot")(plot.command)
-app.command("eval")(evaluate.command)
-app.command("report")(report.command)
+PANELS: dict[str, dict[str, ModuleType]] = {
+    "Pose and suggest": {"suggest": suggest, "pose": pose},
+    "Train and retarget": {"train": train, "regions": regions, "retarget": retarget},
+    "Look and judge": {
+        "inspect": inspect,
+        "view": view,
+        "render": render,
+        "plot": plot,
+        "eval": evaluate,
+        "report": report,
+    },
+    "Prepare takes": {
+        "demo": demo,
+        "convert": convert,
+        "stabilise": stabilise,
+        "clean": clean,
+        "simulate": simulate,
+    },
+    "Without training": {"propagate": propagate, "drive": drive, "points": points},
+    "Live and in other programs": {"live": live, "export-script": export_script},
+}
+for panel, modules in PANELS.items():
+    for name, module in modules.items():
+        if module is points:
+            app.add_typer(points.app, name=name, rich_help_panel=panel)
+        else:
+            app.command(name, cls=Command, rich_help_panel=panel)(module.command)
 
 
 def main() -> None:

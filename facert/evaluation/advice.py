@@ -9,7 +9,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.text import plural
 from facert.evaluation.cells import Outcome
-from facert.evaluation.comparison import Estimate, errors_by_method
+from facert.evaluation.paired import MeanWithError, errors_by_method
 
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
 FIRM = 5  # draws from which on advice can stand alone
@@ -55,5 +55,5 @@ def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
 
 def _ties(behind: FloatArray) -> bool:
     """Whether a distance, one number a repeat, is within its standard error."""
-    distance = Estimate.of(behind)
+    distance = MeanWithError.of(behind)
     return distance.value <= distance.se

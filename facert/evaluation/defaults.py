@@ -1,17 +1,50 @@
-"""How many labels and how much unlabelled data a take can be evaluated with, if nobody says."""
+"""How many labels and how much unlabelled data a take is evaluated with, where it is left open."""
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 
+from facert.data.text import plural
 from facert.errors import InputError
 from facert.evaluation.protocol import Problem, pools
+from facert.evaluation.run import Grid
 from facert.preprocess.training_set import MIN_LABELS
 
+log = logging.getLogger("facert")
+
+MANY = 250
+"""With so many posed frames the numbers need no note: they are those of the help."""
 LABELS = (10, 20, 30, 40)
 UNLABELLED = 100
 LEAST_TESTED = 10
 """Frames that are tested at least where all of `LABELS` are tried."""
+
+
+def chosen_grid(
+    problem: Problem,
+    methods: tuple[str, ...],
+    labels: tuple[int, ...] | None,
+    unlabelled: tuple[int, ...] | None,
+    repeats: int,
+) -> Grid:
+    """The grid of what was asked for; None: the numbers that suit the take.
+
+    Raises
+    ------
+    InputError
+        When too few frames are posed.
+    """
+    frames = unlabelled or (default_unlabelled(problem),)
+    counts = labels or default_labels(problem, max(frames))
+    posed = len(problem.take.labels)
+    if max(counts) < posed < MANY and None in (labels, unlabelled):
+        others = f"{plural(max(frames), 'frame')} without a pose"
+        numbers = " or ".join(map(str, counts))
+        text = "learns from %s of %d posed frames and %s, tests on the rest"
+        log.info(text, numbers, posed, others)
+    return Grid(methods, counts, frames, repeats)
 
 
 def default_unlabelled(problem: Problem) -> int:

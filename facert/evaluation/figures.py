@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from facert.evaluation.summary import Row
+from facert.evaluation.table import EvaluationRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,16 +37,16 @@ class Panel:
 
     axis: Axis
     title: str
-    rows: Sequence[Row]
+    rows: Sequence[EvaluationRow]
 
 
-def plot_errors(rows: Sequence[Row], title: str = "") -> Figure:
+def plot_errors(rows: Sequence[EvaluationRow], title: str = "") -> Figure:
     """RMS of each method, with standard errors, against what varies in the rows.
 
     Parameters
     ----------
-    rows : sequence of Row
-        From `facert.evaluation.summary.summarise`, one with an RMS at least. When labels and
+    rows : sequence of EvaluationRow
+        From `facert.evaluation.table.summarise`, one with an RMS at least. When labels and
         unlabelled data both vary, there is a panel for each: labels with the most unlabelled
         data, and unlabelled data with the fewest labels.
     title : str
@@ -72,7 +72,7 @@ def plot_errors(rows: Sequence[Row], title: str = "") -> Figure:
     return figure
 
 
-def panels(rows: Sequence[Row]) -> list[Panel]:
+def panels(rows: Sequence[EvaluationRow]) -> list[Panel]:
     """What there is to draw: one panel for each number that varies, or one for labels."""
     rows = [row for row in rows if row.rms is not None]
     labels, unlabelled = {row.labels for row in rows}, {row.unlabelled for row in rows}

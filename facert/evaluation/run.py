@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
-import signal
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
-from multiprocessing import active_children, connection, get_context, parent_process
-from threading import Thread
+from pathlib import Path
 
 import numpy as np
 
 from facert.data.take import Take
 from facert.data.version import VERSION
-from facert.errors import FacertError
 from facert.evaluation.cells import Cell, Outcome, evaluate
+from facert.evaluation.processes import call_each
 from facert.evaluation.protocol import Problem, draw
-from facert.io.journal import Journal
+from facert.io.journal import Journal, source_digest
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -71,7 +66,7 @@ def run(
     problem : Problem
     grid : Grid
     settings : Settings, optional
-        How to train, apart from what a cell says.
+        How to train, but for what is the cell's.
     jobs : int
         Processes; 1 stays in this one. The outcomes do not depend on it, apart from the times.
     journal : Journal, optional
@@ -93,16 +88,18 @@ def run(
     yield from kept
     done = {outcome.cell for outcome in kept}
     waiting = [cell for cell in cells if cell not in done]
-    if min(jobs, len(waiting)) > 1:
-        outcomes = _in_processes(problem, waiting, settings, jobs)
-    else:
-        outcomes = (evaluate(problem, cell, settings) for cell in waiting)
-    for outcome in outcomes:
+    for outcome in call_each(evaluate, [(problem, cell, settings) for cell in waiting], jobs):
         if outcome.details:
             log.debug("%s\n%s", outcome.cell, outcome.details)
         elif journal is not None:
             journal.add(outcome.as_dict())
         yield outcome
+
+
+def journal_beside(path: Path, problem: Problem, settings: Settings) -> Journal:
+    """The journal of finished cells, beside the file of the results."""
+    code = source_digest(Path(__file__).parents[1])
+    return Journal(path.with_suffix(".cells.jsonl"), fingerprint(problem, settings) + code)
 
 
 def fingerprint(problem: Problem, settings: Settings | None = None) -> str:
@@ -131,54 +128,6 @@ def _kept(journal: Journal | None, wanted: set[Cell]) -> list[Outcome]:
     if kept:
         log.info("%d of %d cells are done, in %s", len(kept), len(wanted), journal.path)
     return kept
-
-
-_shared: tuple[Problem, Settings]
-
-
-def _in_processes(
-    problem: Problem, cells: Sequence[Cell], settings: Settings, jobs: int
-) -> Iterator[Outcome]:
-    # Spawned: a fork would copy torch's thread pools in whatever state they are.
-    strangers = set(active_children())
-    pool = ProcessPoolExecutor(
-        min(jobs, len(cells)), get_context("spawn"), _begin_process, (problem, settings)
-    )
-    try:
-        for future in as_completed([pool.submit(_evaluate_shared, cell) for cell in cells]):
-            yield future.result()
-    except BrokenProcessPool:
-        raise FacertError(
-            "a process of the evaluation was killed; if for lack of memory, use fewer --jobs"
-        ) from None
-    except BaseException:
-        # Not asked to end but ended: a second Ctrl-C while they finish would leave them hanging.
-        for process in set(active_children()) - strangers:
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown()
-
-
-def _begin_process(problem: Problem, settings: Settings) -> None:
-    """Once a process: the data stays in it, and Ctrl-C is for the parent to handle."""
-    global _shared
-    _shared = problem, settings
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """A parent that was killed cannot tell its processes to end."""
-    parent = parent_process()
-    assert parent is not None  # this is a child
-    connection.wait([parent.sentinel])
-    os._exit(1)
-
-
-def _evaluate_shared(cell: Cell) -> Outcome:
-    problem, settings = _shared
-    return evaluate(problem, cell, settings)
 
 
 def _add_take(digest: hashlib._Hash, take: Take) -> None:

@@ -6,7 +6,7 @@ from experiments.report import markdown, write_csv
 from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
-from facert.evaluation.summary import summarise
+from facert.evaluation.table import summarise
 from facert.methods.registry import REGISTRY
 
 CASE = Case("rom", "arkit")

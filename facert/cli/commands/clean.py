@@ -43,8 +43,11 @@ def command(
     """Fill gaps in markers or weights, and remove noise.
 
     Frozen, swapped and otherwise bad markers are taken as not observed. OUT.h5 has a standard
-    deviation for every value as /source/std, and /source/filled tells what had
-    not been observed. What was never observed stays open.
+    deviation for every value as /source/std, and /source/filled marks what had not been observed.
+    What was never observed stays open.
+
+    facert clean facert-demo/performance.h5 clean.h5
+    facert clean facert-demo/training.h5 --out-dir cleaned --ending .csv
     """
     todo = plan(paths, out_dir, ending, jobs, overwrite)
     work = partial(
@@ -94,10 +97,9 @@ def _print_changes(cleaned: Cleaned, output: Path) -> None:
     source = cleaned.take.source
     unit = f" {cleaned.take.units}" if cleaned.take.units else ""
     share = 100.0 * cleaned.filled.mean()
-    console.out.print(f"wrote {output}", markup=False)
-    console.out.print(
-        f"filled {cleaned.filled.sum()} of {cleaned.filled.size} {source.kind} ({share:.1f} %)",
-        markup=False,
+    console.show(f"wrote {output}")
+    console.show(
+        f"filled {cleaned.filled.sum()} of {cleaned.filled.size} {source.kind} ({share:.1f} %)"
     )
     if cleaned.sigma is not None:
-        console.out.print(f"capture noise {cleaned.sigma:.2g}{unit}", markup=False)
+        console.show(f"capture noise {cleaned.sigma:.2g}{unit}")

@@ -11,7 +11,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan, require_kept
-from facert.cli.shared.options import ENDING, JOBS, OUT_DIR, OVERWRITE, SHAPES
+from facert.cli.shared.options import ENDING, JOBS, OUT_DIR, OVERWRITE, RIG, SHAPES, file_option
 from facert.io.registry import listed
 
 if TYPE_CHECKING:
@@ -41,19 +41,16 @@ def command(
         Kind | None, typer.Option(help="What to read of a .glb that holds both; else the rig.")
     ] = None,
     target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz track, or animation of a .glb.")
+        str | None,
+        file_option("--target", "Which target of an .npz track, or animation of a .glb."),
     ] = None,
     shapes: SHAPES = None,
     map_path: Annotated[
-        Path | None, typer.Option("--map", metavar="TOML", help='New names: theirs = "ours".')
+        Path | None, file_option("--map", 'New names: theirs = "ours".', metavar="TOML")
     ] = None,
     poses_path: Annotated[
         Path | None,
-        typer.Option(
-            "--poses",
-            metavar="FILE",
-            help="Labels from another file, by its column frame (from 0) or by time.",
-        ),
+        file_option("--poses", "Labels from another file, by its column frame or by time."),
     ] = None,
     in_fps: Annotated[
         float | None, typer.Option(min=1e-3, help="Frames a second of IN, if it does not say.")
@@ -68,9 +65,7 @@ def command(
     in_up_axis: Annotated[str, typer.Option(help="The axis up in IN, whatever it says.")] = "",
     up_axis: Annotated[str, typer.Option(help="The axis up in OUT: y, z or x; turned.")] = "",
     start_timecode: Annotated[str, typer.Option(help="Of the first frame, HH:MM:SS:FF.")] = "",
-    rig_path: Annotated[
-        Path | None, typer.Option("--rig", help="The character's rig, for a take as .glb or .usd.")
-    ] = None,
+    rig_path: RIG = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
     jobs: JOBS = None,
@@ -81,7 +76,10 @@ def command(
     Shapes are matched by name in any spelling; rows without a face are dropped and counted.
     A .csv or .json holds the poses when there are any, else the source. A .glb or .usd holds the
     shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
-    does. What IN does not say of its rate, unit or axis is taken to be as OUT's.
+    does. What IN does not state of its rate, unit or axis is taken to be as OUT's.
+
+    facert convert retargeted.h5 curves.csv
+    facert convert retargeted.h5 face.glb --rig facert-demo/character.h5
     """
     from facert.cli.shared.conversion import KINDS, Wanted
     from facert.data.conversion import Changes
@@ -115,4 +113,4 @@ def _convert(
     from facert.cli.shared.conversion import convert_file
 
     said = convert_file(source, output, wanted, changes, overwrite)
-    console.out.print(f"{output}: {said}", markup=False)
+    console.show(f"{output}: {said}")

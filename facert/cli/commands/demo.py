@@ -8,25 +8,28 @@ from typing import Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE
+from facert.cli.shared.options import OVERWRITE, SEED
 
 
 def command(
     folder: Annotated[
-        Path, typer.Argument(metavar="[DIR]", help="Where to write.", show_default=True)
+        Path, typer.Argument(metavar="DIR", help="Where to write.", show_default=True)
     ] = Path("facert-demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Another seed, other performances.")] = 0,
+    seed: SEED = 0,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Write a demo: a performance with a few key poses, another to retarget, and both rigs."""
+    """Write a demo: a performance with a few key poses, another to retarget, and both rigs.
+
+    facert demo
+    facert demo another-demo --seed 1
+    """
     from facert.demo import write_demo
 
     for path in write_demo(folder, seed, overwrite):
-        console.out.print(f"{path}  {path.stat().st_size / 1000:.0f} kB", markup=False)
+        console.show(f"{path}  {path.stat().st_size / 1000:.0f} kB")
     model = folder / "model.safetensors"
     console.out.print("Next:", style="bold")
-    console.out.print(f"  facert train {folder / 'training.h5'} -o {model}", markup=False)
-    console.out.print(
-        f"  facert retarget {folder / 'performance.h5'} {folder / 'retargeted.h5'} --model {model}",
-        markup=False,
+    console.show(f"  facert train {folder / 'training.h5'} -o {model}")
+    console.show(
+        f"  facert retarget {folder / 'performance.h5'} {folder / 'retargeted.h5'} --model {model}"
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES
+from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
 from facert.data.text import plural
 from facert.io.registry import endings
 
@@ -41,7 +41,7 @@ def command(
     ],
     map_path: Annotated[
         Path | None,
-        typer.Option("--map", metavar="TOML", help="The vertex of each point: chin = 1204."),
+        file_option("--map", "The vertex of each point: chin = 1204.", metavar="TOML"),
     ] = None,
     auto: Annotated[
         bool, typer.Option("--auto", help="Each point drives the vertex nearest to it at rest.")
@@ -83,6 +83,9 @@ def command(
     """Deform a face in every frame so that its feature points are where POINTS has them.
 
     Points are named after their vertices, as in v1204, unless there is a map or --auto.
+
+    facert drive facert-demo/actor.h5 facert-demo/training.h5 f.h5 --auto --carry
+    facert drive facert-demo/actor.h5 facert-demo/training.h5 f.glb --auto --carry
     """
     from facert.data.rig import MeshSequence
     from facert.errors import InputError, reading
@@ -110,10 +113,9 @@ def command(
         mesh, take.time, lambda frames: driver.deform(points.positions[frames]), take.fps
     )
     said = _write(sequence, output, tolerance / 100.0, overwrite)
-    console.out.print(
+    console.show(
         f"{output}: {plural(len(take), 'frame')} of {len(mesh.vertices)} vertices, "
-        f"driven by {plural(len(points.vertices), 'point')}{said}",
-        markup=False,
+        f"driven by {plural(len(points.vertices), 'point')}{said}"
     )
 
 

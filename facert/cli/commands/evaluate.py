@@ -5,23 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import DEVICE, OVERWRITE, SHAPES, TARGET
+from facert.cli.shared.options import DEVICE, OVERWRITE, RIG, SEED, SHAPES, TARGET, file_option
+from facert.data.ranges import parse_range
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods.registry import REGISTRY
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from facert.data.take import Take
+    from facert.evaluation.cells import Outcome
     from facert.evaluation.protocol import Problem
     from facert.evaluation.run import Grid
-    from facert.evaluation.summary import Row
+    from facert.evaluation.table import EvaluationRow
+    from facert.io.journal import Journal
+    from facert.settings import Settings
 
 BUILT_IN = "the built-in take"
+WIDEST = 160
 
 
 class Split(StrEnum):
@@ -35,7 +42,8 @@ def command(
     take: Annotated[
         Path | None,
         typer.Argument(
-            help="Take with true poses, in all frames or some; by default the built-in one."
+            metavar="TAKE",
+            help="Take with true poses, in all frames or some; by default the built-in one.",
         ),
     ] = None,
     labels: Annotated[
@@ -65,46 +73,49 @@ def command(
     split: Annotated[
         Split, typer.Option(help="Test on any other frames, or on other blocks of time.")
     ] = Split.random,
-    across: Annotated[Path | None, typer.Option(help="Test on this take instead.")] = None,
-    rig: Annotated[
-        Path | None, typer.Option(help="The character's rig, for errors of its vertices.")
-    ] = None,
+    across: Annotated[Path | None, file_option("--across", "Test on this take instead.")] = None,
+    rig: RIG = None,
     shapes: SHAPES = None,
     test_frames: Annotated[
         int | None, typer.Option(help="Test on so many frames at most.", show_default="all")
     ] = None,
     target: TARGET = None,
-    seed: Annotated[int, typer.Option(help="For every random choice.")] = 0,
+    seed: SEED = 0,
     device: DEVICE = "cpu",
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
     ] = None,
     json_path: Annotated[
         Path | None,
-        typer.Option("--json", help="All figures; an interrupted run continues from beside it."),
+        file_option("--json", "All figures; an interrupted run continues from beside it."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Picture of RMS against labels and unlabelled frames.")
+        Path | None, file_option("--plot", "Picture of RMS against labels and unlabelled frames.")
     ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Compare methods: draw labels at random, train, and test on the other frames."""
+    """Compare methods: draw labels at random, train, and test on the other frames.
+
+    facert eval facert-demo/training.h5 --methods ridge,nearest --repeats 3
+    facert eval --labels 10..40 --json figures.json --plot figures.png
+    """
     _require_outputs(json_path, plot, overwrite)
     if across is not None and split is not Split.random:
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
-    from facert.cli.shared.evaluation_run import Asked, open_journal, run_cells
-    from facert.cli.shared.evaluation_table import error_table
     from facert.cli.shared.pictures import save_picture
     from facert.evaluation.advice import advise
+    from facert.evaluation.defaults import chosen_grid
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
-    from facert.evaluation.summary import summarise
+    from facert.evaluation.run import journal_beside
+    from facert.evaluation.table import summarise
     from facert.io.formats import read_rig_file, targets_for
     from facert.models.device import find_device
     from facert.settings import Settings
 
-    asked = Asked.of(_methods(methods), labels, unlabelled, repeats)
+    numbers = _numbers(labels, "--labels"), _numbers(unlabelled, "--unlabelled")
+    chosen = _methods(methods)
     if device != "cpu":
         find_device(device)
     settings = Settings(device=device)
@@ -117,12 +128,12 @@ def command(
             None if across is None else _read(across, of_across),
             None if rig is None else read_rig_file(rig, shapes),
         )
-        grid = asked.grid(problem)
-        journal = open_journal(problem, settings, json_path)
-        outcomes = run_cells(problem, grid, settings, jobs, journal)
+        grid = chosen_grid(problem, chosen, *numbers, repeats)
+        journal = None if json_path is None else journal_beside(json_path, problem, settings)
+        outcomes = _run(problem, grid, settings, jobs, journal)
     rows = summarise(outcomes, protocol)
     title = _title(_name(take, target), across, problem, grid)
-    console.out.print(error_table(rows, title))
+    console.out.print(_table(rows, title))
     if json_path is not None:
         files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
         _write_json(json_path, {**_plain(files), **_facts(problem, grid)}, rows, overwrite)
@@ -132,7 +143,33 @@ def command(
         save_picture(plot_errors(rows, title), plot, overwrite)
     if journal is not None:
         journal.remove()
-    console.out.print(advise(outcomes), markup=False)
+    console.show(advise(outcomes))
+
+
+def _run(
+    problem: Problem, grid: Grid, settings: Settings, jobs: int | None, journal: Journal | None
+) -> list[Outcome]:
+    """The outcomes of all cells, with a note on what to do after Ctrl-C or an unexpected error."""
+    from facert.cli.shared.progress import watched
+    from facert.evaluation.processes import cores
+    from facert.evaluation.run import run
+
+    try:
+        outcomes = run(problem, grid, settings, jobs or cores(), journal)
+        done = list(watched(outcomes, len(grid.cells), "cells"))
+    except KeyboardInterrupt:
+        if journal is not None:
+            console.log.warning("the same command continues from %s", journal.path)
+        raise
+    unforeseen = sum(bool(outcome.details) for outcome in done)
+    if unforeseen:
+        cells = plural(unforeseen, "cell")
+        console.log.warning("%s failed unexpectedly: facert -v eval shows where", cells)
+    return done
+
+
+def _numbers(text: str | None, option: str) -> tuple[int, ...] | None:
+    return None if text is None else parse_range(text, option)
 
 
 def _require_outputs(json_path: Path | None, plot: Path | None, overwrite: bool) -> None:
@@ -183,6 +220,43 @@ def _title(name: str, across: Path | None, problem: Problem, grid: Grid) -> str:
     return ", ".join(parts)
 
 
+def _table(rows: Sequence[EvaluationRow], title: str) -> Table:
+    """A section for each number of labels and of unlabelled data, its best method in bold.
+
+    Why a method could not run stands below.
+    """
+    from rich import box
+    from rich.measure import Measurement
+    from rich.table import Table
+    from rich.text import Text
+
+    from facert.evaluation.table import Column, columns_of, failures_of, sections_of
+
+    columns = [Column("labels", "labels"), *columns_of(rows)]
+    if len({row.unlabelled for row in rows}) > 1:
+        columns.insert(1, Column("unlabelled", "unlabelled"))
+    table = Table(
+        title=Text(title),
+        title_justify="left",
+        caption=Text("\n".join(failures_of(rows))),
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    for one in columns:
+        justify: Literal["left", "right"] = "left" if one.field == "method" else "right"
+        table.add_column(one.title, justify=justify, no_wrap=True)
+    for section, least in sections_of(rows):
+        for row in section:
+            cells = [one.text(row) for one in columns]
+            table.add_row(*cells, style="bold" if row is least else None)
+        table.add_section()
+    # Numbers cut short are of no use: the table is as wide as it must be, in a file as well.
+    options = console.out.options.update(width=WIDEST)
+    table.width = Measurement.get(console.out, options, table).maximum
+    return table
+
+
 def _plain(files: Mapping[str, Path | str | None]) -> dict[str, str | None]:
     return {name: None if value is None else str(value) for name, value in files.items()}
 
@@ -205,7 +279,9 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
     }
 
 
-def _write_json(path: Path, settings: dict[str, Any], rows: Sequence[Row], overwrite: bool) -> None:
+def _write_json(
+    path: Path, settings: dict[str, Any], rows: Sequence[EvaluationRow], overwrite: bool
+) -> None:
     import json
     from dataclasses import asdict
 

@@ -27,8 +27,11 @@ def command(
 ) -> None:
     """Print a Python script that keys a character with curves (.json or .csv) of facert.
 
-    It keys the shape keys of a Blender object, or the attributes of a Maya node, by time, and
-    says at its top how to run it.
+    It keys the shape keys of a Blender object, or the attributes of a Maya node, by time. How to
+    run it stands at its top.
+
+    facert export-script blender -o facert_curves.py
+    facert export-script maya > facert_maya.py
     """
     from facert.cli.shared import console
     from facert.io.atomic import replacing
@@ -40,4 +43,4 @@ def command(
         return
     with replacing(output, overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    console.out.print(f"wrote {output}", markup=False)
+    console.show(f"wrote {output}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import SHAPES, TARGET
+from facert.cli.shared.options import AS_JSON, SHAPES, TARGET
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,9 +21,13 @@ def command(
     ],
     target: TARGET = None,
     shapes: SHAPES = None,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    as_json: AS_JSON = False,
 ) -> None:
-    """Show what is in a file: units, rates, names, gaps, labels, active channels."""
+    """Show what is in a file: units, rates, names, gaps, labels, active channels.
+
+    facert inspect facert-demo/training.h5
+    facert inspect model.safetensors --json
+    """
     import json
 
     facts = _facts(path, target, shapes)
@@ -59,15 +63,14 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 
 def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Of a model, for people: the settings that its method uses, and plain names of figures."""
-    from facert.cli.commands.train import FOR_PEOPLE
     from facert.methods.registry import method_class
     from facert.settings import OF_SHARED
 
     settings, figures = facts["settings"], facts["figures"]
     idle = () if method_class(settings["method"]).stepwise else OF_SHARED
     used = {name: value for name, value in settings.items() if name not in idle}
-    told = {FOR_PEOPLE.get(name, name): value for name, value in figures.items()}
-    return {**facts, "settings": used, "figures": told}
+    named = {console.FIGURES.get(name, name): value for name, value in figures.items()}
+    return {**facts, "settings": used, "figures": named}
 
 
 def _table(title: str, facts: Mapping[str, Any]) -> Table:

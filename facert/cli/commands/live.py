@@ -17,9 +17,19 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from facert.cli.commands.train import DEFAULT_MODEL
 from facert.cli.shared import console
-from facert.cli.shared.options import CONTROLS, NO_DETECT, NO_SMOOTH, SIGMA, chosen_options
+from facert.cli.shared.options import (
+    AS_JSON,
+    CONTROLS,
+    DEFAULT_MODEL,
+    NO_DETECT,
+    NO_SMOOTH,
+    OVERWRITE,
+    SIGMA,
+    TARGET,
+    chosen_options,
+    file_option,
+)
 
 if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
@@ -64,9 +74,7 @@ def command(
         ),
     ] = "127.0.0.1",
     speed: Annotated[float, typer.Option(min=0.01, max=100, help="Of a played take.")] = 1.0,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several.")
-    ] = None,
+    target: TARGET = None,
     controls_path: CONTROLS = None,
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
@@ -82,19 +90,22 @@ def command(
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Take of what comes in: .h5, .csv, .livelink.csv."),
+        file_option("--record", "Take of what comes in: .h5, .csv, .livelink.csv."),
     ] = None,
     frames: Annotated[
         int | None, typer.Option(min=1, help="Stop after so many; else Ctrl-C does.")
     ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The summary, for programs.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace recorded files.")] = False,
+    as_json: AS_JSON = False,
+    overwrite: OVERWRITE = False,
 ) -> None:
     """Retarget frame after frame as they come in, and send each pose at once.
 
     A status line shows rate, latency, and packets that were dropped or bad. Files are written at
     the end.
+
+    facert live --in take:facert-demo/performance.h5 --out csv:live.csv
+    facert live --in livelink:11111 --out vmc:127.0.0.1:39539 --listen 0.0.0.0
     """
     from facert.cli.shared.live_status import Status, print_summary
     from facert.errors import reading

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, TARGET
+from facert.cli.shared.options import OVERWRITE, TARGET, TRUTH
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -20,16 +20,18 @@ if TYPE_CHECKING:
 def command(
     take_path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take with poses.")],
     output: Annotated[Path, typer.Argument(metavar="OUT.png", help="The picture.")],
-    truth_path: Annotated[
-        Path | None, typer.Option("--truth", help="A take with the true poses.")
-    ] = None,
+    truth_path: TRUTH = None,
     controls: Annotated[
         str, typer.Option(help="For instance smile,jaw_open; by default the most varying.")
     ] = "",
     target: TARGET = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Draw controls over time, with their uncertainty and the truth."""
+    """Draw controls over time, with their uncertainty and the truth.
+
+    facert plot retargeted.h5 curves.png
+    facert plot retargeted.h5 jaw.svg --controls jaw_open
+    """
     from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.io.formats import read_take_file, targets_for
     from facert.render.faces import require_poses
@@ -48,7 +50,7 @@ def command(
     with reading(take_path):
         figure = plot_controls(take, truth, names)
     save_picture(figure, output, overwrite)
-    console.out.print(f"{output}: {plural(len(figure.axes), 'control')}", markup=False)
+    console.show(f"{output}: {plural(len(figure.axes), 'control')}")
 
 
 def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES
+from facert.cli.shared.help import Command, Group
+from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from facert.data.arrays import IntArray
     from facert.data.rig import Mesh
 
-app = typer.Typer(help="Feature points of a face.", no_args_is_help=True)
+app = typer.Typer(cls=Group, help="Feature points of a face.", no_args_is_help=True)
 
 
 @app.callback()
@@ -25,14 +26,14 @@ def points() -> None:
     """Feature points that drive a face."""
 
 
-@app.command("suggest")
+@app.command("suggest", cls=Command)
 def suggest(
     rig_path: Annotated[
         Path, typer.Argument(metavar="RIG", help="A rig file, .npz or folder of .obj.")
     ],
     count: Annotated[int, typer.Option("-n", min=1, help="How many points.")] = 80,
     picture: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Draw them on the face.")
+        Path | None, file_option("--picture", "Draw them on the face.", metavar="PNG")
     ] = None,
     shapes: SHAPES = None,
     overwrite: OVERWRITE = False,
@@ -41,6 +42,9 @@ def suggest(
 
     The numbers are those of the picture. The last line has the vertices with commas between them,
     as `facert simulate --vertices` takes them.
+
+    facert points suggest facert-demo/actor.h5 -n 40
+    facert points suggest facert-demo/actor.h5 -n 20 --picture points.png
     """
     from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading

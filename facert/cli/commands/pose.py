@@ -7,9 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli.commands.train import DEFAULT_MODEL
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared.options import (
+    ACTOR,
+    DEFAULT_MODEL,
+    HOST,
+    OVERWRITE,
+    PORT,
+    RIG,
+    SEED,
+    SHAPES,
+    TARGET,
+    file_option,
+)
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
@@ -42,7 +52,7 @@ def command(
         ),
     ] = None,
     poses: Annotated[
-        Path | None, typer.Option("--poses", help="A take with known poses, instead of a model's.")
+        Path | None, file_option("--poses", "A take with known poses, instead of a model's.")
     ] = None,
     start: Annotated[
         str,
@@ -64,26 +74,29 @@ def command(
         float, typer.Option(min=0.0, help="Standard deviation of the values; 0: exactly.")
     ] = 0.0,
     samples: Annotated[int, typer.Option(min=0, max=10_000, help="Other plausible poses.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="For the samples.")] = 0,
+    seed: SEED = 0,
     target: TARGET = None,
     overwrite: OVERWRITE = False,
     view: Annotated[
-        bool, typer.Option("--view", help="Pose in the browser, with a slider a control.")
+        bool,
+        typer.Option(
+            "--view", help="Pose in the browser, with sliders; with --rig, --take, --actor."
+        ),
     ] = False,
-    rig: Annotated[
-        Path | None, typer.Option("--rig", help="The character's rig, for --view.")
-    ] = None,
+    rig: RIG = None,
     take: Annotated[
-        Path | None, typer.Option("--take", help="The recording to pose, for --view.")
+        Path | None, file_option("--take", "The recording to pose, for --view.")
     ] = None,
-    actor: Annotated[
-        Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
-    ] = None,
+    actor: ACTOR = None,
     shapes: SHAPES = None,
-    host: Annotated[str, typer.Option(help="Address of the page.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port of the page, or the next free one.")] = 8080,
+    host: HOST = "127.0.0.1",
+    port: PORT = 8080,
 ) -> None:
-    """Find the most probable whole pose given a few controls; or pose with sliders (--view)."""
+    """Find the most probable whole pose given a few controls; or pose with sliders (--view).
+
+    facert pose --set jawOpen=0.4 -o posed.h5
+    facert pose --view --rig facert-demo/character.h5
+    """
     if view:
         from facert.cli.shared.pose_view import Files, open_page
 
@@ -118,7 +131,7 @@ def command(
     console.out.print(_table(done, soft))
     if output is not None:
         _write(done, output, overwrite)
-        console.out.print(f"wrote {output}", markup=False)
+        console.show(f"wrote {output}")
 
 
 def _parse(wanted: list[str]) -> dict[str, float]:

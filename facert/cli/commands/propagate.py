@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, TARGET
+from facert.cli.shared.options import OVERWRITE, TARGET, file_option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -39,9 +39,9 @@ def command(
     ] = None,
     positions: Annotated[
         Path | None,
-        typer.Option(
-            metavar="TAKE",
-            help="The character's feature points: its markers in the key frames, instead of poses.",
+        file_option(
+            "--positions",
+            "The character's feature points: its markers in the key frames, instead of poses.",
         ),
     ] = None,
     method: Annotated[
@@ -68,7 +68,11 @@ def command(
     target: TARGET = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Write poses, or feature points, for every frame of a take from a few key frames."""
+    """Write poses, or feature points, for every frame of a take from a few key frames.
+
+    facert propagate facert-demo/training.h5 whole.h5
+    facert propagate facert-demo/training.h5 path.h5 --method path
+    """
     import numpy as np
 
     from facert.errors import reading
@@ -91,10 +95,10 @@ def command(
             result = propagate_positions(take, points, chosen, how)
     write_take_file(result, output, overwrite)
     made = f"{plural(len(result), 'frame')} from {plural(len(chosen), 'key frame')}"
-    console.out.print(f"{output}: {made}", markup=False)
+    console.show(f"{output}: {made}")
     error = _error(result, take if positions is None else points, chosen)
     if error:
-        console.out.print(error, markup=False)
+        console.show(error)
 
 
 def _keys(keys: str, every: int | None, posed: IntArray, frames: int) -> list[int]:

@@ -12,13 +12,16 @@ from facert.errors import reading
 
 
 def command(
-    take: Annotated[Path, typer.Argument(help="Take with poses in some frames.")],
+    take: Annotated[Path, typer.Argument(metavar="TAKE", help="Take with poses in some frames.")],
     target: TARGET = None,
 ) -> None:
-    """Find regions of markers and controls: facert regions take.h5 > regions.toml.
+    """Find regions of markers and controls, and print them as TOML.
 
-    What it prints is what `facert train --regions auto` learns apart; edit it, and give it to
+    These are what `facert train --regions auto` learns apart; edit them, and give the file to
     `facert train --regions regions.toml`. A control may be in several regions.
+
+    facert regions facert-demo/training.h5
+    facert regions facert-demo/training.h5 > regions.toml
     """
     from facert.io.formats import read_take_file
     from facert.io.toml import regions_text

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, file_option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -29,15 +29,13 @@ def command(
         Path,
         typer.Argument(metavar="OUT", help="A sheet (.png, .pdf, .svg) or a clip (.mp4, .gif)."),
     ],
-    rig_path: Annotated[
-        Path | None, typer.Option("--rig", help="The character's rig, for a take.")
-    ] = None,
+    rig_path: RIG = None,
     truth_path: Annotated[
-        Path | None, typer.Option("--truth", help="The true poses, or the true mesh sequence.")
+        Path | None, file_option("--truth", "The true poses, or the true mesh sequence.")
     ] = None,
     beside: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Another face of the same frames; again for more."),
+        file_option("--beside", "Another face of the same frames; again for more.", metavar="FILE"),
     ] = None,
     frames: Annotated[
         str,
@@ -54,6 +52,9 @@ def command(
     """Draw faces: a take with its rig or a mesh sequence, beside the truth and others.
 
     A sheet shows some frames, by default such as differ well; a clip shows the motion.
+
+    facert render retargeted.h5 faces.png --rig facert-demo/character.h5
+    facert render retargeted.h5 face.gif --rig facert-demo/character.h5 --size 96
     """
     from facert.cli.shared.faces import open_face
     from facert.cli.shared.pictures import ENDINGS, require_picture_name
@@ -75,7 +76,7 @@ def command(
             said = _sheet(faces, take, wanted, size, output, overwrite)
         else:
             said = _clip(faces, wanted, size, fps, output, overwrite)
-    console.out.print(f"{output}: {said}", markup=False)
+    console.show(f"{output}: {said}")
 
 
 def _sheet(

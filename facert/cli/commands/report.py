@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError
 
@@ -25,18 +25,18 @@ def command(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="The page.", metavar="PAGE.html")
     ] = Path("report.html"),
-    rig_path: Annotated[
-        Path | None, typer.Option("--rig", help="The character's rig, to draw faces.")
-    ] = None,
-    truth_path: Annotated[
-        Path | None, typer.Option("--truth", help="The true poses of the same frames.")
-    ] = None,
+    rig_path: RIG = None,
+    truth_path: TRUTH = None,
     title: Annotated[str, typer.Option(help="Stands above all.")] = "",
     shapes: SHAPES = None,
     target: TARGET = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Write one HTML file with tables, figures and faces, that opens without a network."""
+    """Write one HTML file with tables, figures and faces, that opens without a network.
+
+    facert report retargeted.h5 --rig facert-demo/character.h5
+    facert report . -o whole-folder.html
+    """
     if output.suffix.lower() not in ENDINGS:
         expected, found = f"a name that ends in {ENDINGS[0]}", repr(output.suffix)
         raise InputError("output", expected, found, "Give another name.", where=str(output))
@@ -58,4 +58,4 @@ def command(
             sections.append(file_section(path, rig, truth))
     name = title or ", ".join(path.resolve().name for path in results)
     write_report(make_report(name, tuple(sections)), output, overwrite)
-    console.out.print(f"{output}: {plural(len(sections), 'section')}", markup=False)
+    console.show(f"{output}: {plural(len(sections), 'section')}")

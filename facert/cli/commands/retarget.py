@@ -10,19 +10,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from facert.cli.commands.train import DEFAULT_MODEL
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan
 from facert.cli.shared.options import (
     CONTROLS,
+    DEFAULT_MODEL,
     DEVICE,
     ENDING,
     JOBS,
+    MODEL,
     NO_DETECT,
     NO_SMOOTH,
     OUT_DIR,
     OVERWRITE,
     SIGMA,
+    TARGET,
     chosen_options,
 )
 from facert.data.text import plural
@@ -50,9 +52,7 @@ def command(
             "controls. With --out-dir: any number of takes, or folders of takes.",
         ),
     ],
-    model: Annotated[
-        Path, typer.Option("--model", "-m", help="Model file that train wrote.")
-    ] = DEFAULT_MODEL,
+    model: MODEL = DEFAULT_MODEL,
     mode: Annotated[
         Mode, typer.Option(help="All frames at once, or one after the other as in a live stream.")
     ] = Mode.offline,
@@ -68,16 +68,18 @@ def command(
     sigma: SIGMA = None,
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
-    target: Annotated[
-        str | None, typer.Option(help="Which target of an .npz take that has several is the truth.")
-    ] = None,
+    target: TARGET = None,
     device: DEVICE = "cpu",
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
     jobs: JOBS = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Write the character's parameters for every frame of a take."""
+    """Write the character's parameters for every frame of a take.
+
+    facert retarget facert-demo/performance.h5 retargeted.h5
+    facert retarget facert-demo/training.h5 --out-dir results --ending .csv
+    """
     todo = plan(paths, out_dir, ending, jobs, overwrite)
     options = partial(
         chosen_options,
@@ -125,7 +127,7 @@ def _retarget(
     facert.write_take(result, output, overwrite)
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
-    console.out.print(f"wrote {output}", markup=False)
+    console.show(f"wrote {output}")
     _tell_error(take, result, retargeter)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES
+from facert.cli.shared.options import OVERWRITE, SEED, SHAPES
 from facert.data.text import plural
 
 
@@ -34,12 +34,15 @@ def command(
         float, typer.Option(min=0.0, max=1.0, help="Share of the markers' positions to hide.")
     ] = 0.0,
     shapes: SHAPES = None,
-    seed: Annotated[int, typer.Option(min=0, help="For markers, noise and gaps.")] = 0,
+    seed: SEED = 0,
     overwrite: OVERWRITE = False,
 ) -> None:
     """Simulate a marker capture by driving a rig with recorded weights.
 
     The weights that drive the rig are the target of the take: its truth.
+
+    facert simulate facert-demo/character.h5 curves.csv simulated.h5
+    facert simulate facert-demo/character.h5 curves.csv gaps.h5 --missing 0.1
     """
     from facert.errors import reading
     from facert.io.formats import read_rig_file, read_source_file, write_take_file
@@ -62,7 +65,7 @@ def command(
     write_take_file(take, output, overwrite)
     controls = 0 if take.controls is None else len(take.controls.names)
     markers_of = f"{plural(len(take), 'frame')} of {plural(len(take.source.names), 'marker')}"
-    console.out.print(f"{output}: {markers_of}, {plural(controls, 'control')}", markup=False)
+    console.show(f"{output}: {markers_of}, {plural(controls, 'control')}")
 
 
 def _indices(text: str) -> list[int]:

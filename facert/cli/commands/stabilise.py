@@ -9,7 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.batch import require_other_file
-from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET
+from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET, file_option
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -26,7 +26,7 @@ def command(
     stable: Annotated[
         str,
         typer.Option(
-            metavar="NAME,NAME,...|automatic",
+            metavar="NAME,NAME,...",
             help="Markers that hardly move against the skull, three at least; or find those "
             "whose distances to each other change least.",
         ),
@@ -37,9 +37,9 @@ def command(
     ] = "mean",
     like: Annotated[
         Path | None,
-        typer.Option(
-            metavar="TAKE",
-            help="A take of the same actor that was stabilised before, for the same head pose.",
+        file_option(
+            "--like",
+            "A take of the same actor that was stabilised before, for the same head pose.",
         ),
     ] = None,
     no_detect: NO_DETECT = False,
@@ -51,6 +51,9 @@ def command(
     Frozen, swapped and otherwise bad markers are taken as not observed. Frames that show fewer
     than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
     as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
+
+    facert stabilise facert-demo/performance.h5 stable.h5
+    facert stabilise facert-demo/performance.h5 as-first.h5 --reference 0
     """
     from facert.cli.shared.cleaned_take import read_observed, write_beside
     from facert.io.formats import read_source_file, targets_for
@@ -99,7 +102,7 @@ def _print_removed(found: Stabilised, output: Path) -> None:
         f"motion left in them: {found.residual:.2g}{unit} RMS",
     )
     for line in lines:
-        console.out.print(line, markup=False)
+        console.show(line)
 
 
 def _size(values: FloatArray, unit: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SHAPES, TARGET
+from facert.cli.shared.options import AS_JSON, OVERWRITE, SEED, SHAPES, TARGET, file_option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -31,23 +31,24 @@ def command(
             help="Go on from the take's posed frames, or from a model that is trained already.",
         ),
     ] = "",
-    seed: Annotated[
-        int, typer.Option(min=0, help="Which frames of a take of thousands are looked at.")
-    ] = 0,
+    seed: SEED = 0,
     sheet: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="A contact sheet of the frames.")
+        Path | None, file_option("--sheet", "A contact sheet of the frames.", metavar="PNG")
     ] = None,
     rig_path: Annotated[
-        Path | None, typer.Option("--rig", help="The actor's rig, to draw tracked weights.")
+        Path | None, file_option("--rig", "The actor's rig, to draw tracked weights.")
     ] = None,
     target: TARGET = None,
     shapes: SHAPES = None,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    as_json: AS_JSON = False,
     overwrite: OVERWRITE = False,
 ) -> None:
     """Print the frames whose posing would help most, the most useful first.
 
     Without --have poses are not looked at. Frames are numbered from 0.
+
+    facert suggest facert-demo/training.h5 -n 12 --sheet suggested.png
+    facert suggest facert-demo/training.h5 --have labels
     """
     import json
 
@@ -143,4 +144,4 @@ def _print(rows: Sequence[dict[str, object]]) -> None:
         table.add_row(str(row["frame"]), _moment(row), f"{row['share']:.1%}")
     console.out.print(table)
     in_time = sorted((str(row["frame"]) for row in rows), key=int)
-    console.out.print(f"in order of time: {','.join(in_time)}", markup=False)
+    console.show(f"in order of time: {','.join(in_time)}")

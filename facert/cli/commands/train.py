@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET
+from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, TARGET
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods.registry import REGISTRY
-from facert.settings import OF_SHARED, Settings
+from facert.settings import (
+    DEFAULTS,
+    DESCRIBED,
+    FINE,
+    OF_SHARED,
+    SHARED,
+    Settings,
+    choices,
+    default_text,
+)
 
 if TYPE_CHECKING:
     from facert.data.regions import Regions
@@ -21,121 +32,89 @@ if TYPE_CHECKING:
     from facert.models.optim.monitor import Monitor
     from facert.retarget.retargeter import Retargeter
 
-DEFAULT_MODEL = Path("model.safetensors")
-DEFAULTS = Settings()
 SMALL = 0.01  # of numbers below it digits are shown, not decimals
-FOR_PEOPLE = {"seconds": "training seconds"}
-"""Figures whose name alone says too little."""
 
 
-def _setting(name: str, text: str, unset: str = "from the data") -> Any:
-    """An option that is None unless given, so that it can come before the config file."""
-    default = getattr(DEFAULTS, name)
-    return typer.Option(help=text, show_default=unset if default is None else str(default))
+def with_settings(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command an option for each setting but the finest ones; unset, they are None."""
+    signature = inspect.signature(function, eval_str=True)
+    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    made = [_option(name) for name, (_, about) in DESCRIBED.items() if about.group != FINE]
+    function.__signature__ = signature.replace(parameters=[*own, *made])  # type: ignore[attr-defined]
+    return function
 
 
+def _option(name: str) -> inspect.Parameter:
+    """The option of a setting."""
+    kind, about = DESCRIBED[name]
+    plain = next((one for one in (bool, int, float) if one in (kind, *get_args(kind))), str)
+    methods = f" One of {', '.join(REGISTRY)}." if name == "method" else ""
+    option = typer.Option(
+        help=about.help + methods,
+        show_default=default_text(name),
+        metavar="|".join(choices(kind)) or None,
+        rich_help_panel=about.group,
+    )
+    annotation = Annotated[plain | None, option]  # type: ignore[valid-type]
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(name, keyword, default=None, annotation=annotation)
+
+
+@with_settings
 def command(
     take: Annotated[
         Path | None,
-        typer.Argument(help="Take with poses in some frames; by default the built-in one."),
+        typer.Argument(
+            metavar="TAKE", help="Take with poses in some frames; by default the built-in one."
+        ),
     ] = None,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Model file to write.")
     ] = DEFAULT_MODEL,
-    method: Annotated[str | None, _setting("method", "One of " + ", ".join(REGISTRY) + ".")] = None,
-    labels: Annotated[
-        int | None, _setting("labels", "Use only so many of the posed frames, at random.", "all")
-    ] = None,
-    unlabelled: Annotated[
-        int | None,
-        _setting(
-            "unlabelled",
-            "Frames without a pose, and poses without a frame.",
-            "100 for the shared models, else all",
-        ),
-    ] = None,
-    latent_dim: Annotated[
-        int | None, _setting("latent_dim", "Latent dimensions of the shared models.")
-    ] = None,
-    neighbours: Annotated[
-        int | None, _setting("neighbours", "Neighbours in the prior of the shared models.")
-    ] = None,
-    sigma_c: Annotated[
-        float | None,
-        _setting("sigma_c", "Capture noise, in units of the largest deviation of a coordinate."),
-    ] = None,
-    limits: Annotated[
-        str | None,
-        _setting("limits", "Clip poses to: auto (declared, else seen), declared, or none."),
-    ] = None,
-    optimizer: Annotated[
-        str | None, _setting("optimizer", "Of the shared models: lbfgs, or scg (the paper's).")
-    ] = None,
-    regions: Annotated[
-        str | None,
-        _setting(
-            "regions",
-            "Learn parts of the face apart: auto, or a TOML file as facert regions prints it.",
-            "the face as a whole",
-        ),
-    ] = None,
-    neutral: Annotated[
-        str | None,
-        _setting(
-            "neutral", "Frames in which the actor rests, as 12 or 0..20.", "the smallest pose"
-        ),
-    ] = None,
-    no_detect: NO_DETECT = False,
-    no_smooth: Annotated[
-        bool, typer.Option("--no-smooth", help="Learn from every frame as it was measured.")
-    ] = False,
-    seed: Annotated[int | None, _setting("seed", "For every random choice.")] = None,
-    device: Annotated[
-        str | None, _setting("device", "cpu or, for the shared models, cuda.")
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(help="TOML file with any of the settings; options given here come first."),
-    ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue a shared model from its checkpoint.")
-    ] = False,
-    start: Annotated[
-        Path | None,
-        typer.Option(
-            help="A trained shared model to begin at, as after another frame was posed; its "
-            "settings are the defaults."
-        ),
-    ] = None,
-    curve: Annotated[
-        Path | None,
-        typer.Option("--log", help="CSV file for the training curve of a shared model."),
-    ] = None,
-    target: TARGET = None,
     predicted: Annotated[
         bool,
         typer.Option("--allow-predicted", help="Learn from poses that a model predicted as well."),
     ] = False,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TOML", help="File with any of the settings; options given here come first."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            help="Continue a shared model from its checkpoint.",
+            rich_help_panel=SHARED,
+        ),
+    ] = False,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Begin at a trained shared model, as after another frame was posed; its settings "
+            "are the defaults.",
+            rich_help_panel=SHARED,
+        ),
+    ] = None,
+    curve: Annotated[
+        Path | None,
+        typer.Option(
+            "--log", metavar="CSV", help="File for the training curve.", rich_help_panel=SHARED
+        ),
+    ] = None,
+    target: TARGET = None,
     overwrite: OVERWRITE = False,
+    **options: Any,
 ) -> None:
-    """Learn to retarget from a take's poses, its other frames, and old animation."""
+    """Learn to retarget from a take's poses, its other frames, and old animation.
+
+    facert train facert-demo/training.h5
+    facert train facert-demo/training.h5 --method gpr -o gpr.safetensors
+    """
     _require_output(output, curve)
-    options = {
-        "method": method,
-        "labels": labels,
-        "unlabelled": unlabelled,
-        "latent_dim": latent_dim,
-        "neighbours": neighbours,
-        "sigma_c": sigma_c,
-        "limits": limits,
-        "optimizer": optimizer,
-        "neutral": neutral,
-        "detect": False if no_detect else None,
-        "smooth": False if no_smooth else None,
-        "regions": _regions(regions),
-        "seed": seed,
-        "device": device,
-    }
+    options["regions"] = _regions(regions := options["regions"])
 
     import facert
     from facert.cli.shared.progress import ProgressBar
@@ -207,8 +186,8 @@ def _warn_of_idle_settings(settings: Settings, unasked: Settings) -> None:
 
     idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(unasked, name)]
     if idle and not method_class(settings.method).stepwise:
-        told = "%s does not use %s: settings of the shared models, sgplvm and ssgplvm"
-        console.log.warning(told, settings.method, ", ".join(idle))
+        text = "%s does not use %s: settings of the shared models, sgplvm and ssgplvm"
+        console.log.warning(text, settings.method, ", ".join(idle))
 
 
 def _warn_of_idle_options(settings: Settings, options: dict[str, object]) -> None:
@@ -255,7 +234,8 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
     table = Table(title=title, show_header=False)
     for name, value in figures.items():
         table.add_row(
-            FOR_PEOPLE.get(name, name), _shown(value) if isinstance(value, float) else str(value)
+            console.FIGURES.get(name, name),
+            _shown(value) if isinstance(value, float) else str(value),
         )
     console.out.print(table)
 

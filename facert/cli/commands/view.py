@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import SHAPES, TARGET
+from facert.cli.shared.options import ACTOR, HOST, PORT, RIG, SHAPES, TARGET, TRUTH
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
@@ -21,26 +21,23 @@ if TYPE_CHECKING:
 
 def command(
     path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take, or what retarget wrote.")],
-    rig_path: Annotated[Path | None, typer.Option("--rig", help="The character's rig.")] = None,
-    truth_path: Annotated[
-        Path | None, typer.Option("--truth", help="The true poses of the same frames.")
-    ] = None,
+    rig_path: RIG = None,
+    truth_path: TRUTH = None,
     model: Annotated[
         Path | None, typer.Option("--model", "-m", help="Retarget TAKE with this model first.")
     ] = None,
-    actor_path: Annotated[
-        Path | None, typer.Option("--actor", help="The actor's rig, to draw tracked weights.")
-    ] = None,
+    actor_path: ACTOR = None,
     target: TARGET = None,
     shapes: SHAPES = None,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; 0.0.0.0 for other machines as well.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port, or the next free one.")] = 8080,
+    host: HOST = "127.0.0.1",
+    port: PORT = 8080,
 ) -> None:
     """Show a performance in the browser: source, character and truth, with errors and curves.
 
     Ctrl-C ends it.
+
+    facert view retargeted.h5 --rig facert-demo/character.h5
+    facert view facert-demo/performance.h5 --model model.safetensors
     """
     import facert
     from facert.io.formats import read_rig_file, read_source_file, read_take_file, targets_for
@@ -62,7 +59,7 @@ def command(
         actor = actor_of(take, actor_path, shapes)
     with page_server(path.name, host, port) as server:
         page = ViewPage(server, performance, actor)
-        console.out.print(f"{address(server)} (Ctrl-C ends it)", markup=False)
+        console.show(f"{address(server)} (Ctrl-C ends it)")
         wait_for_interrupt()
         page.worker.stop()
 

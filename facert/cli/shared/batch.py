@@ -205,7 +205,7 @@ def _attempt(work: Work, source: Path, output: Path) -> str | None:
 
 
 def _tell(status: str, text: str) -> None:
-    console.out.print(f"{status:7s} {text}", markup=False)
+    console.show(f"{status:7s} {text}")
 
 
 def _files(path: Path) -> list[Path]:

@@ -22,6 +22,15 @@ class _StderrHandler(logging.Handler):
         err.print(prefix + self.format(record), style="yellow" if warning else None, markup=False)
 
 
+FIGURES = {"seconds": "training seconds"}
+"""Figures of a model whose name alone says too little."""
+
+
+def show(text: str) -> None:
+    """Print a line of results as it is: what stands in brackets is no markup."""
+    out.print(text, markup=False)
+
+
 def configure(quiet: bool, verbose: bool) -> None:
     """Send the package's log to stderr: warnings only, notes (default) or details."""
     log.handlers[:] = [_StderrHandler()]

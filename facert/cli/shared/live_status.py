@@ -84,7 +84,7 @@ def print_summary(session: LiveSession, written: Sequence[Path], as_json: bool) 
         console.out.print(_pace(pace))
     console.out.print(f"{session.counters.received} received, {_counts(session.counters)}")
     for path in written:
-        console.out.print(f"wrote {path}", markup=False)
+        console.show(f"wrote {path}")
 
 
 def _pace(pace: Pace) -> str:

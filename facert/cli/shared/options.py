@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from facert.cli.shared.help import FILES
 
 if TYPE_CHECKING:
     from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
-TARGET = Annotated[
-    str | None, typer.Option("--target", help="Which target of an .npz take that has several.")
-]
-SHAPES = Annotated[
-    str | None, typer.Option("--shapes", help="Which of several sets of shapes of an .npz rig.")
-]
-OVERWRITE = Annotated[bool, typer.Option("--overwrite", help="Replace existing output files.")]
-CONTROLS = Annotated[
-    Path | None,
-    typer.Option(
-        "--controls", help="TOML file with gain, limits and smoothing of single controls."
-    ),
-]
+DEFAULT_MODEL = Path("model.safetensors")
+
+MODEL = Annotated[Path, typer.Option("--model", "-m", help="Model file that train wrote.")]
+SEED = Annotated[int, typer.Option("--seed", min=0, help="For every random choice.")]
+AS_JSON = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 NO_DETECT = Annotated[
-    bool, typer.Option("--no-detect", help="Believe every marker, even what looks bad.")
+    bool, typer.Option("--no-detect", help="Take every marker as observed, even what looks bad.")
 ]
 NO_SMOOTH = Annotated[bool, typer.Option("--no-smooth", help="Map every frame as it was measured.")]
 SIGMA = Annotated[
@@ -35,35 +29,62 @@ SIGMA = Annotated[
         help="Standard deviation of the capture noise in the take's units; else estimated.",
     ),
 ]
-OUT_DIR = Annotated[
-    Path | None,
-    typer.Option("--out-dir", help="Folder for the results of several takes, named after them."),
-]
-ENDING = Annotated[
-    str | None,
-    typer.Option(
-        "--ending",
-        help="Of the files in --out-dir, which tells their format.",
-        show_default=".h5",
-    ),
-]
-JOBS = Annotated[
-    int | None,
-    typer.Option(
-        "--jobs",
-        "-j",
-        min=0,
-        help="Takes at a time in --out-dir; 0: one a processor core.",
-        show_default="1",
-    ),
-]
-
 DEVICE = Annotated[
     str,
     typer.Option(
         "--device", help="Where the shared models compute: cpu or cuda; all others stay on the CPU."
     ),
 ]
+HOST = Annotated[
+    str,
+    typer.Option("--host", help="Address of the page; 0.0.0.0 for other machines as well."),
+]
+PORT = Annotated[int, typer.Option("--port", help="Port of the page, or the next free one.")]
+
+
+def file_option(name: str, text: str, *names: str, **more: Any) -> Any:
+    """An option in the panel of files."""
+    return typer.Option(name, *names, help=text, rich_help_panel=FILES, **more)
+
+
+TARGET = Annotated[
+    str | None,
+    file_option("--target", "Which target of an .npz take that has several.", metavar="KEY"),
+]
+SHAPES = Annotated[
+    str | None,
+    file_option("--shapes", "Which of several sets of shapes of an .npz rig.", metavar="KEY"),
+]
+RIG = Annotated[Path | None, file_option("--rig", "The character's rig.")]
+TRUTH = Annotated[Path | None, file_option("--truth", "The true poses of the same frames.")]
+ACTOR = Annotated[Path | None, file_option("--actor", "The actor's rig, to draw tracked weights.")]
+CONTROLS = Annotated[
+    Path | None,
+    file_option("--controls", "Gain, limits and smoothing of single controls.", metavar="TOML"),
+]
+OUT_DIR = Annotated[
+    Path | None,
+    file_option(
+        "--out-dir", "Folder for the results of several takes, named after them.", metavar="DIR"
+    ),
+]
+ENDING = Annotated[
+    str | None,
+    file_option(
+        "--ending", "Of the files in --out-dir; their format goes by it.", show_default=".h5"
+    ),
+]
+JOBS = Annotated[
+    int | None,
+    file_option(
+        "--jobs",
+        "Takes at a time in --out-dir; 0: one a processor core.",
+        "-j",
+        min=0,
+        show_default="1",
+    ),
+]
+OVERWRITE = Annotated[bool, file_option("--overwrite", "Replace existing output files.")]
 
 
 def chosen_options(

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from facert.cli.commands.train import DEFAULT_MODEL
 from facert.cli.shared import console
+from facert.cli.shared.options import DEFAULT_MODEL
 from facert.errors import InputError, OutputExistsError, reading
 
 if TYPE_CHECKING:
@@ -51,11 +51,11 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     with page_server(title, host, port) as server:
         with reading(files.rig):
             page = PosePage(server, rig, session, actor)
-        console.out.print(f"{address(server)} (Ctrl-C ends it)", markup=False)
+        console.show(f"{address(server)} (Ctrl-C ends it)")
         wait_for_interrupt()
         page.stop()
     if session.saved:
-        console.out.print(f"{session.output}: {session.saved} poses saved", markup=False)
+        console.show(f"{session.output}: {session.saved} poses saved")
 
 
 def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> PosingSession:

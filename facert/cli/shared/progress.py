@@ -1,15 +1,41 @@
-"""Training drawn on stderr: a bar on a terminal, nothing elsewhere."""
+"""Long work drawn on stderr: a bar on a terminal."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable, Iterator
 from types import TracebackType
+from typing import TypeVar
 
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from facert.cli.shared import console
 from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor
+
+Thing = TypeVar("Thing")
+
+
+def watched(things: Iterable[Thing], total: int, noun: str) -> Iterator[Thing]:
+    """Things as they come: with a bar on a terminal, elsewhere with a note for every tenth."""
+    notes, terminal = console.log.isEnabledFor(logging.INFO), console.err.is_terminal
+    columns = (BarColumn(), MofNCompleteColumn(), noun, TimeRemainingColumn())
+    hidden = not (terminal and notes)
+    with Progress(*columns, console=console.err, transient=True, disable=hidden) as bar:
+        task = bar.add_task("", total=total)
+        for done, thing in enumerate(things, start=1):
+            yield thing
+            bar.advance(task)
+            if not terminal and 10 * done // total > 10 * (done - 1) // total:
+                console.log.info("%d of %d %s", done, total, noun)
 
 
 class ProgressBar(Monitor):

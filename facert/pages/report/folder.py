@@ -20,8 +20,8 @@ from facert.io.formats import read_take_file
 from facert.io.hdf5 import RIG_FORMAT, TAKE_FORMAT, stated_format
 from facert.io.registry import OWN_ENDINGS
 from facert.io.rig import read_rig
-from facert.pages.report.evaluation import read_evaluation
-from facert.pages.report.performance import fits, performance_section, truth_among
+from facert.pages.report.evaluation_section import read_evaluation
+from facert.pages.report.performance_section import fits, performance_section, truth_among
 from facert.pages.report.sections import Fact, Section
 
 log = logging.getLogger("facert")

@@ -10,7 +10,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined, Template
 
 from facert.io.atomic import replacing
-from facert.pages.report.comparison import comparison_section
+from facert.pages.report.comparison_section import comparison_section
 from facert.pages.report.sections import Fact, Report, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")

@@ -15,10 +15,10 @@ import pytest
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.errors import InputError
-from facert.evaluation.summary import Row
-from facert.pages.report.evaluation import read_evaluation
+from facert.evaluation.table import EvaluationRow
+from facert.pages.report.evaluation_section import read_evaluation
 from facert.pages.report.page import make_report, to_html
-from facert.pages.report.performance import fits, performance_section, truth_among
+from facert.pages.report.performance_section import fits, performance_section, truth_among
 from facert.pages.report.sections import Fact, Section, Table
 
 HOSTILE = '<script>alert("1")</script>'
@@ -43,11 +43,11 @@ class Seen(HTMLParser):
         self.text += data
 
 
-def row(method: str, labels: int, rms: float | None, **others) -> Row:
+def row(method: str, labels: int, rms: float | None, **others) -> EvaluationRow:
     values = {"noise": 0.0, "missing": 0.0, "repeats": 2, "rms_se": 0.01, "ratio_to_best": 1.0}
     values |= {"rms_normalised": 0.1, "jitter": 0.01, "vertex_rms": None, "vertex_p95": None}
     values |= {"per_control": (0.1, 0.2, 0.3, 0.4), "fit_seconds": 0.1, "frame_ms": 0.1}
-    return Row(method=method, labels=labels, unlabelled=5, rms=rms, **(values | others))
+    return EvaluationRow(method=method, labels=labels, unlabelled=5, rms=rms, **(values | others))
 
 
 @pytest.fixture

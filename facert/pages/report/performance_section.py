@@ -10,7 +10,7 @@ from facert.data.shared_controls import SharedControls, require_shared, shared_c
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.evaluation.metrics import Comparison, compare
-from facert.pages.report.pictures import embedded
+from facert.pages.report.embedding import embedded
 from facert.pages.report.sections import Fact, Picture, Section, Table
 from facert.render.faces import choose_frames, drives, posed_face, require_poses
 from facert.render.plots import plot_controls

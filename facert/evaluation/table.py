@@ -1,21 +1,23 @@
-"""Means over the repeats: one row for each method, number of labels and of unlabelled data."""
+"""The table of results: means over the repeats, and the columns that show them everywhere."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.text import plural
 from facert.evaluation.cells import Outcome
 from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
 
 
 @dataclass(frozen=True)
-class Row:
+class EvaluationRow:
     """A method at one number of labels and of unlabelled data: means over the repeats.
 
     Parameters
@@ -56,8 +58,72 @@ class Row:
     frame_ms: float | None
     failure: str = ""
 
+    @property
+    def draws(self) -> int | None:
+        """How many repeats there were, where some but not all could be run."""
+        return self.repeats if self.failure and self.repeats else None
 
-def summarise(outcomes: Iterable[Outcome], protocol: Protocol) -> list[Row]:
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table, on a terminal and in a report.
+
+    Parameters
+    ----------
+    title : str
+    field : str
+        The attribute of an `EvaluationRow`.
+    form : str
+        How a value is formatted.
+    absent : str
+        What stands for no value.
+    """
+
+    title: str
+    field: str
+    form: str = ""
+    absent: str = "-"
+
+    def text(self, row: EvaluationRow) -> str:
+        """The cell of a row."""
+        value = getattr(row, self.field)
+        return self.absent if value is None else f"{value:{self.form}}"
+
+
+COLUMNS = (
+    Column("method", "method"),
+    Column("RMS", "rms", ".4f", "cannot run"),
+    Column("±", "rms_se", ".4f"),
+    Column("/ best", "ratio_to_best", ".2f"),
+    Column("of range", "rms_normalised", ".1%"),
+    Column("jitter", "jitter", ".4f"),
+    Column("vertex", "vertex_rms", ".4f"),
+    Column("95 %", "vertex_p95", ".4f"),
+    Column("fit s", "fit_seconds", ".2f"),
+    Column("ms/frame", "frame_ms", ".3f"),
+    Column("draws", "draws"),
+)
+
+
+def columns_of(rows: Sequence[EvaluationRow]) -> list[Column]:
+    """The columns that show something in these rows."""
+    return [
+        column
+        for column in COLUMNS
+        if column.field == "rms" or any(getattr(row, column.field) is not None for row in rows)
+    ]
+
+
+def sections_of(
+    rows: Sequence[EvaluationRow],
+) -> Iterator[tuple[list[EvaluationRow], EvaluationRow | None]]:
+    """The rows of each number of labels and of unlabelled data, and the best one."""
+    for _, members in groupby(rows, lambda row: (row.labels, row.unlabelled)):
+        section = list(members)
+        yield section, best(section)
+
+
+def summarise(outcomes: Iterable[Outcome], protocol: Protocol) -> list[EvaluationRow]:
     """Rows by rising labels, then unlabelled; within them the best method first, failures last."""
     groups: dict[tuple[int, int, str], list[Outcome]] = defaultdict(list)
     for outcome in sorted(outcomes, key=lambda outcome: outcome.cell.repeat):
@@ -68,18 +134,30 @@ def summarise(outcomes: Iterable[Outcome], protocol: Protocol) -> list[Row]:
     return sorted(rows, key=_rank)
 
 
-def best(rows: Sequence[Row]) -> Row | None:
+def failures_of(rows: Sequence[EvaluationRow]) -> list[str]:
+    """One line for each reason: who failed, at how many labels, and why."""
+    reasons: dict[tuple[int, str], list[str]] = defaultdict(list)
+    for row in rows:
+        if row.failure:
+            reasons[row.labels, row.failure].append(row.method)
+    return [
+        f"{', '.join(dict.fromkeys(methods))} with {plural(labels, 'label')}: {reason}"
+        for (labels, reason), methods in reasons.items()
+    ]
+
+
+def best(rows: Sequence[EvaluationRow]) -> EvaluationRow | None:
     """The row of least RMS among those without a failure."""
     complete = [row for row in rows if row.rms is not None and not row.failure]
     return min(complete, key=lambda row: row.rms or 0.0, default=None)
 
 
-def _row(outcomes: Sequence[Outcome], protocol: Protocol) -> Row:
+def _row(outcomes: Sequence[Outcome], protocol: Protocol) -> EvaluationRow:
     cell = outcomes[0].cell
     ran = [outcome for outcome in outcomes if outcome.scores is not None]
     scores = [outcome.scores for outcome in ran if outcome.scores is not None]
     errors = np.array([s.rms for s in scores])
-    return Row(
+    return EvaluationRow(
         method=cell.method,
         labels=cell.labels,
         unlabelled=cell.unlabelled,
@@ -100,14 +178,14 @@ def _row(outcomes: Sequence[Outcome], protocol: Protocol) -> Row:
     )
 
 
-def _with_ratio(row: Row, rows: Sequence[Row]) -> Row:
+def _with_ratio(row: EvaluationRow, rows: Sequence[EvaluationRow]) -> EvaluationRow:
     least = best([r for r in rows if (r.labels, r.unlabelled) == (row.labels, row.unlabelled)])
     if row.rms is None or least is None or not least.rms:
         return row
     return replace(row, ratio_to_best=row.rms / least.rms)
 
 
-def _rank(row: Row) -> tuple[int, int, bool, float, str]:
+def _rank(row: EvaluationRow) -> tuple[int, int, bool, float, str]:
     error = np.inf if row.rms is None else row.rms
     return row.labels, row.unlabelled, bool(row.failure), error, row.method
 

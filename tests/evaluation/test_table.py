@@ -6,7 +6,7 @@ from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.figures import panels, plot_errors
 from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
-from facert.evaluation.summary import best, summarise
+from facert.evaluation.table import best, summarise
 
 
 def outcome(method, labels, repeat, rms, unlabelled=100):

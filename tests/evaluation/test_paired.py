@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from facert.evaluation.cells import Cell, Outcome
-from facert.evaluation.comparison import Estimate, errors_by_method, paired_ratio
 from facert.evaluation.metrics import Scores
+from facert.evaluation.paired import MeanWithError, errors_by_method, paired_ratio
 
 numbers = st.lists(st.floats(0.01, 1.0), min_size=2, max_size=8).map(np.array)
 
@@ -16,9 +16,9 @@ def outcome(method, labels, repeat, rms):
 
 
 def test_a_mean_comes_with_its_standard_error():
-    found = Estimate.of(np.array([1.0, 3.0, 5.0]))
+    found = MeanWithError.of(np.array([1.0, 3.0, 5.0]))
     assert (found.value, found.se) == (3.0, pytest.approx(2.0 / 3**0.5))
-    assert np.isnan(Estimate.of(np.array([1.0])).se)
+    assert np.isnan(MeanWithError.of(np.array([1.0])).se)
 
 
 @given(numbers, st.floats(0.1, 10.0))

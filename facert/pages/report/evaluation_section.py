@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
@@ -15,9 +14,9 @@ import numpy as np
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.figures import INK, plot_errors
-from facert.evaluation.summary import Row, best
+from facert.evaluation.table import EvaluationRow, columns_of, sections_of
 from facert.io.guarded import existing_file, read_text
-from facert.pages.report.pictures import embedded
+from facert.pages.report.embedding import embedded
 from facert.pages.report.sections import Fact, Picture, Section, Table
 
 if TYPE_CHECKING:
@@ -26,9 +25,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 2**26
 MAX_ROWS = 20_000
 MOST_CONTROLS = 80  # that a picture names
-TOLD = ("take", "target", "across", "rig", "split", "noise", "missing", "seed", "repeats")
-
-Column = Callable[[Row], str]
+SHOWN = ("take", "target", "across", "rig", "split", "noise", "missing", "seed", "repeats")
 
 
 def read_evaluation(path: Path) -> Section:
@@ -50,7 +47,7 @@ def read_evaluation(path: Path) -> Section:
         return _section(path.name, *_checked(content))
 
 
-def _section(name: str, settings: Mapping[str, Any], rows: list[Row]) -> Section:
+def _section(name: str, settings: Mapping[str, Any], rows: list[EvaluationRow]) -> Section:
     drawn = [row for row in rows if row.rms is not None]
     pictures: list[Picture] = []
     if drawn:
@@ -61,50 +58,28 @@ def _section(name: str, settings: Mapping[str, Any], rows: list[Row]) -> Section
         if picture is not None:
             caption = f"RMS of each control, with {plural(most, 'label')}"
             pictures.append(embedded(picture, caption, "svg"))
-    told = [Fact(key, _told(settings[key])) for key in TOLD if settings.get(key) not in (None, "")]
+    known = {key: settings[key] for key in SHOWN if settings.get(key) not in (None, "")}
     versions = settings.get("versions")
     if isinstance(versions, Mapping):
-        told += [Fact(str(key), _told(value)) for key, value in versions.items()]
+        known |= versions
+    facts = tuple(Fact(str(key), _text(value)) for key, value in known.items())
     failures = sorted({f"{row.method}: {row.failure}" for row in rows if row.failure})
-    return Section(
-        f"Evaluation: {name}", " ".join(failures), tuple(pictures), _tables(rows), tuple(told)
-    )
+    title, text = f"Evaluation: {name}", " ".join(failures)
+    return Section(title, text, tuple(pictures), tuple(_tables(rows)), facts)
 
 
-def _tables(rows: Sequence[Row]) -> tuple[Table, ...]:
+def _tables(rows: Sequence[EvaluationRow]) -> Iterator[Table]:
     """One for each number of labels and of unlabelled data, the best method marked."""
-    columns = {name: show for name, show in _COLUMNS.items() if any(show(row) for row in rows)}
-    tables = []
-    for (labels, unlabelled), members in groupby(rows, lambda row: (row.labels, row.unlabelled)):
-        section = list(members)
-        least = best(section)
-        cells = tuple(tuple(show(row) for show in columns.values()) for row in section)
+    columns = columns_of(rows)
+    for section, least in sections_of(rows):
+        caption = f"{plural(section[0].labels, 'label')}, {section[0].unlabelled} unlabelled"
+        titles = tuple(column.title for column in columns)
+        cells = tuple(tuple(column.text(row) for column in columns) for row in section)
         chosen = frozenset(index for index, row in enumerate(section) if row is least)
-        caption = f"{plural(labels, 'label')}, {unlabelled} unlabelled"
-        tables.append(Table(caption, tuple(columns), cells, chosen))
-    return tuple(tables)
+        yield Table(caption, titles, cells, chosen)
 
 
-def _number(value: float | None, form: str = ".4f") -> str:
-    return "" if value is None else f"{value:{form}}"
-
-
-_COLUMNS: dict[str, Column] = {
-    "method": lambda row: row.method,
-    "RMS": lambda row: _number(row.rms),
-    "± s.e.": lambda row: _number(row.rms_se),
-    "/ best": lambda row: _number(row.ratio_to_best, ".2f"),
-    "of range": lambda row: _number(row.rms_normalised, ".1%"),
-    "jitter": lambda row: _number(row.jitter),
-    "vertex": lambda row: _number(row.vertex_rms),
-    "vertex, 95 %": lambda row: _number(row.vertex_p95),
-    "fit, s": lambda row: _number(row.fit_seconds, ".2f"),
-    "ms a frame": lambda row: _number(row.frame_ms, ".3f"),
-    "draws": lambda row: f"{row.repeats}",
-}
-
-
-def _per_control(rows: Sequence[Row], controls: Sequence[str]) -> Figure | None:
+def _per_control(rows: Sequence[EvaluationRow], controls: Sequence[str]) -> Figure | None:
     """Colours for the RMS of each method and control."""
     from matplotlib.figure import Figure
 
@@ -128,7 +103,7 @@ def _per_control(rows: Sequence[Row], controls: Sequence[str]) -> Figure | None:
     return figure
 
 
-def _checked(content: object) -> tuple[Mapping[str, Any], list[Row]]:
+def _checked(content: object) -> tuple[Mapping[str, Any], list[EvaluationRow]]:
     """The settings and rows of a file that may hold anything."""
     if not isinstance(content, dict) or not isinstance(content.get("settings"), dict):
         raise _unexpected("file", "settings and rows", "something else")
@@ -138,11 +113,11 @@ def _checked(content: object) -> tuple[Mapping[str, Any], list[Row]]:
     return content["settings"], [_row(index, entry) for index, entry in enumerate(entries)]
 
 
-def _row(index: int, entry: object) -> Row:
+def _row(index: int, entry: object) -> EvaluationRow:
     """A row whose values have the types that they should."""
-    hints = get_type_hints(Row)
+    hints = get_type_hints(EvaluationRow)
     values: dict[str, Any] = {}
-    for field in fields(Row):
+    for field in fields(EvaluationRow):
         where = f"rows/{index}/{field.name}"
         value = entry.get(field.name, field.default) if isinstance(entry, dict) else MISSING
         if field.name == "per_control":
@@ -153,7 +128,7 @@ def _row(index: int, entry: object) -> Row:
         if not good:
             raise _unexpected(where, "a finite number, or text", repr(value))
         values[field.name] = value
-    return Row(**values)
+    return EvaluationRow(**values)
 
 
 def _fits(value: object, hint: Any) -> bool:
@@ -170,7 +145,7 @@ def _sequence(value: object) -> Sequence[Any]:
     return value if isinstance(value, (list, tuple)) else ()
 
 
-def _told(value: object) -> str:
+def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -15,7 +15,7 @@ LEAST = 1e-12  # an RMS below this is as good as none; one can still divide by i
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MeanWithError:
     """A mean over draws.
 
     Parameters
@@ -29,19 +29,19 @@ class Estimate:
     se: float
 
     @classmethod
-    def of(cls, values: FloatArray) -> Estimate:
+    def of(cls, values: FloatArray) -> MeanWithError:
         """The mean of values (n,), one a draw."""
         return cls(float(values.mean()), _standard_error(values))
 
 
-def paired_ratio(errors: FloatArray, others: FloatArray) -> Estimate:
+def paired_ratio(errors: FloatArray, others: FloatArray) -> MeanWithError:
     """The ratio r of two means over the same draws, (n,) each.
 
     Its standard error is that of a ratio estimator: of the mean of errors - r others, over the
     mean of the others (Cochran 1977, Sampling Techniques, chapter 6).
     """
     ratio = float(errors.mean() / others.mean())
-    return Estimate(ratio, _standard_error(errors - ratio * others) / float(others.mean()))
+    return MeanWithError(ratio, _standard_error(errors - ratio * others) / float(others.mean()))
 
 
 def errors_by_method(outcomes: Iterable[Outcome]) -> dict[str, FloatArray]:
