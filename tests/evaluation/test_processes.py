@@ -20,7 +20,7 @@ def test_results_come_from_this_process_where_one_job_will_do():
 
 @pytest.mark.slow
 def test_a_process_that_was_killed_is_a_line_of_advice():
-    with pytest.raises(FacertError, match="a process was killed; .* use fewer --jobs"):
+    with pytest.raises(FacertError, match=r"a process was killed; .* use fewer --jobs"):
         list(call_each(os._exit, [(1,), (1,)], jobs=2))
 
 
@@ -32,11 +32,12 @@ def test_processes_end_with_a_parent_that_was_killed():
         "import os; print(*call_each(os.getpid, [(), ()], 2), flush=True)\n"
         "list(call_each(time.sleep, [(60,), (60,)], 2))"
     )
-    parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    children = set(parent.stdout.readline().split())
-    time.sleep(0.5)
-    os.kill(parent.pid, signal.SIGKILL)
-    parent.wait()
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        children = set(parent.stdout.readline().split())
+        time.sleep(0.5)
+        os.kill(parent.pid, signal.SIGKILL)
     until = time.monotonic() + 20
     while any(Path(f"/proc/{child}/fd/0").exists() for child in children):
         assert time.monotonic() < until
