@@ -13,14 +13,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.demo.build import Build
-from facert.demo.parts import (
-    FORWARD,
-    ORIGIN,
-    Patch,
-    cast_from_front,
-    cast_from_inside,
-    strips,
-)
+from facert.demo.parts import FORWARD, ORIGIN, Patch, cast_from_front, cast_from_inside, strips
 
 INSIDE = (0.16, 0.05, 0.06)
 LASHES = (0.20, 0.11, 0.09)

@@ -18,16 +18,18 @@ from facert.live.senders import SocketAddress, UdpSender, written_place
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 LOOPBACK = "127.0.0.1"
-IN_PORTS = {"livelink": 11111, "vmc": 39540, "osc": 9000, "ifacialmocap": 49983}
-OUT_PORTS = {"livelink": 11111, "vmc": 39539, "osc": 9000}
 IN_FILES: Mapping[str, tuple[str, ...]] = {"take": ()}
 OUT_FILES: Mapping[str, tuple[str, ...]] = {"csv": (".csv",), "h5": (".h5", ".hdf5")}
 
-_ENCODERS: Mapping[str, Callable[[Sequence[str]], Encoder]] = {
-    "livelink": LiveLinkEncoder,
-    "vmc": VmcEncoder,
-    "osc": OscEncoder,
-}
+
+@dataclass(frozen=True)
+class Protocol:
+    """A protocol over UDP: its usual ports, and what reads and writes its packets, where it can."""
+
+    in_port: int
+    decoder: Callable[[Take], Decoder]
+    out_port: int | None = None
+    encoder: Callable[[Sequence[str]], Encoder] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class File:
 
 def parse_input(text: str) -> Address | File:
     """The place that ``KIND[:PORT]`` or ``take:FILE`` names; ValueError for anything else."""
-    place = _parse(text, IN_PORTS, IN_FILES, "livelink:11111")
+    ports = {kind: protocol.in_port for kind, protocol in PROTOCOLS.items()}
+    place = _parse(text, ports, IN_FILES, "livelink:11111")
     if isinstance(place, Address) and place.host != LOOPBACK:
         raise ValueError(f"{text!r}: give {place.kind}:PORT, and the address with --listen")
     return place
@@ -66,7 +69,8 @@ def parse_input(text: str) -> Address | File:
 
 def parse_output(text: str) -> Address | File:
     """The place that ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE`` names; likewise."""
-    return _parse(text, OUT_PORTS, OUT_FILES, f"vmc:{LOOPBACK}:39539")
+    ports = {kind: one.out_port for kind, one in PROTOCOLS.items() if one.out_port is not None}
+    return _parse(text, ports, OUT_FILES, f"vmc:{LOOPBACK}:39539")
 
 
 def _parse(
@@ -108,7 +112,7 @@ def open_receiver(address: Address, listen: str, wanted: Take) -> UdpReceiver:
     InputError
         When the port is taken, or the protocol cannot bring what the model wants.
     """
-    decoder = _decoder(address.kind, wanted)
+    decoder = PROTOCOLS[address.kind].decoder(wanted)
     family, where = _resolve(address, listen)
     listening = socket.socket(family, socket.SOCK_DGRAM)
     try:
@@ -132,7 +136,9 @@ def open_sender(address: Address, controls: tuple[str, ...], counters: Counters)
     InputError
         When there is no such host, or the protocol cannot hold any of the controls.
     """
-    encoder = _ENCODERS[address.kind](controls)
+    make = PROTOCOLS[address.kind].encoder
+    assert make is not None  # `parse_output` accepts no others
+    encoder = make(controls)
     family, where = _resolve(address, address.host)
     return UdpSender(encoder, family, where, counters)
 
@@ -179,18 +185,33 @@ def _is_own(host: ipaddress.IPv4Address | ipaddress.IPv6Address) -> bool:
     return True
 
 
-def _decoder(kind: str, wanted: Take) -> Decoder:
-    source = wanted.source
-    if kind in ("vmc", "osc"):
-        return OscDecoder(source.names, source.kind, wanted.units)
-    if source.kind == "markers":
+def _weights_only(kind: str, decoder: Callable[[], Decoder]) -> Callable[[Take], Decoder]:
+    """What makes the decoder of a protocol that brings weights, for a model that wants some."""
+
+    def make(wanted: Take) -> Decoder:
+        if wanted.source.kind != "markers":
+            return decoder()
         raise InputError(
             f"--in {kind}",
             "markers, as the model was trained on",
             "weights",
             "Give --in osc or --in take, or a model of tracked weights.",
         )
-    return LiveLinkDecoder() if kind == "livelink" else IFacialMocapDecoder()
+
+    return make
+
+
+def _named(wanted: Take) -> Decoder:
+    """The decoder of a protocol that names its weights or markers."""
+    return OscDecoder(wanted.source.names, wanted.source.kind, wanted.units)
+
+
+PROTOCOLS: Mapping[str, Protocol] = {
+    "livelink": Protocol(11111, _weights_only("livelink", LiveLinkDecoder), 11111, LiveLinkEncoder),
+    "vmc": Protocol(39540, _named, 39539, VmcEncoder),
+    "osc": Protocol(9000, _named, 9000, OscEncoder),
+    "ifacialmocap": Protocol(49983, _weights_only("ifacialmocap", IFacialMocapDecoder)),
+}
 
 
 def _resolve(address: Address, host: str) -> tuple[socket.AddressFamily, SocketAddress]:

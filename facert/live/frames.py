@@ -68,39 +68,26 @@ def frame_pattern(names: Sequence[str], kind: SourceKind = "weights", units: str
 
 @dataclass
 class Counters:
-    """How many frames and packets there were, by what became of them.
-
-    Attributes
-    ----------
-    received : int
-        Frames with a face, in order: each is mapped, dropped, or failed.
-    mapped : int
-        Frames whose pose was sent.
-    dropped : int
-        Frames that a newer one overtook before they were mapped.
-    failed : int
-        Frames for which there is no finite pose.
-    hidden : int
-        Frames in which the sender saw no face.
-    late : int
-        Packets that came twice, after a newer one, or from a second sender.
-    bad : int
-        Packets that could not be understood.
-    unsent : int
-        Packets that the system would not send.
-    refused : int
-        Packets to this machine for which nobody listened, as far as the system reports it.
-    """
+    """How many frames and packets there were, by what became of them."""
 
     received: int = 0
+    """Frames with a face, in order: each is mapped, dropped, or failed."""
     mapped: int = 0
+    """Frames whose pose was sent."""
     dropped: int = 0
+    """Frames that a newer one overtook before they were mapped."""
     failed: int = 0
+    """Frames for which there is no finite pose."""
     hidden: int = 0
+    """Frames in which the sender saw no face."""
     late: int = 0
+    """Packets that came twice, after a newer one, or from a second sender."""
     bad: int = 0
+    """Packets that could not be decoded."""
     unsent: int = 0
+    """Packets that the system would not send."""
     refused: int = 0
+    """Packets to this machine for which nobody listened, as far as the system reports it."""
 
 
 class Decoder(Protocol):
@@ -155,10 +142,6 @@ class Output(Protocol):
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Pass on the pose of a frame, without waiting for anybody."""
-        ...
-
-    def close(self) -> None:
-        """Release files and sockets."""
         ...
 
 

@@ -8,7 +8,7 @@ import tempfile
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -179,6 +179,9 @@ class PoseRecord(_Record):
         return {"source": self._source(values), "params": params, "std": known}
 
 
+_AnyRecord = TypeVar("_AnyRecord", bound=_Record)
+
+
 class Recordings:
     """All files that are written when a session is over.
 
@@ -200,21 +203,15 @@ class Recordings:
         self._incoming, self._overwrite = incoming, overwrite
         like = frame_pattern(cleaned, incoming.source.kind, incoming.units)
         self._posed = replace(like, controls=controls, params=np.zeros((1, len(controls.names))))
-        self._records: dict[Path, SourceRecord | PoseRecord] = {}
+        self._records: dict[Path, _Record] = {}
 
     def source(self, path: Path) -> SourceRecord:
         """A new file of what comes in; raises what `_Record` does."""
-        self._require_new(path)
-        record = SourceRecord(path, self._overwrite, self._incoming)
-        self._records[path.absolute()] = record
-        return record
+        return self._add(SourceRecord, path, self._incoming)
 
     def poses(self, path: Path) -> PoseRecord:
         """A new file of the poses; raises what `_Record` does."""
-        self._require_new(path)
-        record = PoseRecord(path, self._overwrite, self._posed)
-        self._records[path.absolute()] = record
-        return record
+        return self._add(PoseRecord, path, self._posed)
 
     def write(self, start_timecode: str) -> list[Path]:
         """Write them all, whatever happens to one of them; return what there is now.
@@ -242,8 +239,11 @@ class Recordings:
         for record in self._records.values():
             record.close()
 
-    def _require_new(self, path: Path) -> None:
+    def _add(self, kind: type[_AnyRecord], path: Path, like: Take) -> _AnyRecord:
         if path.absolute() in self._records:
             raise InputError(
                 "output", "a file for each recording", "one for two", "Rename one.", str(path)
             )
+        record = kind(path, self._overwrite, like)
+        self._records[path.absolute()] = record
+        return record

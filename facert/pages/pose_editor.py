@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray
 from facert.data.take import Controls
 from facert.posing.completed_pose import FAR
 from facert.posing.completion import Completion, Posed
@@ -35,7 +36,7 @@ class PoseEditor:
         self.controls = controls
         self.known = known
         self.pins: dict[int, float] = {}
-        self._completions: dict[tuple[int, ...], Completion] = {}
+        self._completion = lru_cache(KEPT)(self._learn_completion)
         self._start: FloatArray | None = None
         self._start_std: FloatArray | None = None
         self._posed = self._solve(0, 0)
@@ -66,7 +67,7 @@ class PoseEditor:
         if self.known is None or self._start is not None or not self.pins:
             return False
         given = self._given()
-        return self._completion(given.controls).farness(given.values) > FAR
+        return self._completion(tuple(sorted(self.pins))).farness(given.values) > FAR
 
     def begin(self, pose: FloatArray | None, std: FloatArray | None = None) -> None:
         """Start from a pose (P,) with nothing pinned; from the neutral one without it."""
@@ -95,7 +96,7 @@ class PoseEditor:
     def learn(self, known: KnownPoses | None) -> None:
         """Learn from other known poses."""
         self.known = known
-        self._completions = {}
+        self._completion.cache_clear()
         self._posed = self._solve(0, 0)
 
     def samples(self, count: int, seed: int) -> FloatArray:
@@ -116,7 +117,7 @@ class PoseEditor:
             return Posed(pose, np.zeros_like(pose), np.empty((0, len(pose))))
         rng = np.random.default_rng(seed)
         if self.pins and self._start is None:
-            return self._completion(given.controls).pose(given, samples, rng)
+            return self._completion(tuple(sorted(self.pins))).pose(given, samples, rng)
         if self.pins:
             return correct(base, self._start_std, self.known, given, samples, rng)
         spread = np.zeros_like(base) if self._start_std is None else self._start_std
@@ -128,15 +129,9 @@ class PoseEditor:
         values = np.array([self.pins[control] for control in chosen], dtype=np.float64)
         return Given(np.array(chosen, dtype=np.int64), values)
 
-    def _completion(self, given: IntArray) -> Completion:
-        """Learned once for each set of pinned controls."""
+    def _learn_completion(self, controls: tuple[int, ...]) -> Completion:
         assert self.known is not None  # the caller has looked
-        key = tuple(given.tolist())
-        if key not in self._completions:
-            while len(self._completions) >= KEPT:
-                self._completions.pop(next(iter(self._completions)))
-            self._completions[key] = Completion.learn(self.known, given)
-        return self._completions[key]
+        return Completion.learn(self.known, np.array(controls, dtype=np.int64))
 
 
 def slider_bounds(editor: PoseEditor) -> FloatArray:

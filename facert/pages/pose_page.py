@@ -274,7 +274,7 @@ class _PoseStage:
             FacePart(server, f"other {number}", rig.mesh, own) for number in range(1, SAMPLES + 1)
         ]
         for part in self._samples:
-            part.shown = False
+            part.root.visible = False
             self._stage.add(part, row=1)
 
     def draw(self, frame: int, pose: FloatArray) -> None:
@@ -285,11 +285,11 @@ class _PoseStage:
 
     def show_samples(self, poses: FloatArray) -> None:
         """Other poses (n, P) beside the character, at most `SAMPLES`."""
-        changed = [part.shown for part in self._samples].count(True) != len(poses)
+        changed = sum(part.root.visible for part in self._samples) != len(poses)
         for part, vertices in zip(self._samples, self._vertices(poses), strict=False):
             part.draw(vertices)
         for number, part in enumerate(self._samples):
-            part.shown = number < len(poses)
+            part.root.visible = number < len(poses)
         if changed:
             self._stage.arrange()
 

@@ -56,15 +56,6 @@ class Part:
             f"/{label}/label", label, position=(0.0, -0.56, 0.0), anchor="top-center"
         )
 
-    @property
-    def shown(self) -> bool:
-        """Whether it is on the stage."""
-        return bool(self.root.visible)
-
-    @shown.setter
-    def shown(self, shown: bool) -> None:
-        self.root.visible = shown
-
     def _placed(self, points: FloatArray) -> FloatArray:
         return np.asarray((points - self._centre) * self._scale)
 
@@ -223,7 +214,7 @@ class Stage:
 
     def _line_up(self) -> None:
         """Each row about the middle, the next one below it."""
-        rows = [[part for part in row if part.shown] for row in self._rows]
+        rows = [[part for part in row if part.root.visible] for row in self._rows]
         widths = [0.0]
         with self._server.atomic():
             for number, row in enumerate(rows):

@@ -96,13 +96,7 @@ def drives(rig: Rig, names: Sequence[str]) -> bool:
 
 
 def require_drawable(take: Take, rig: Rig | None) -> None:
-    """Check that there is a rig to draw a take of weights, and none for markers.
-
-    Raises
-    ------
-    InputError
-        When there is not.
-    """
+    """Raise InputError unless there is a rig to draw a take of weights, and none for markers."""
     if take.source.kind == "markers" and rig is not None:
         raise _misfit("a take of weights", "a take of markers")
     if take.source.kind == "weights" and rig is None:
@@ -128,13 +122,7 @@ def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
 
 
 def require_poses(take: Take) -> FloatArray:
-    """The take's poses (T, P).
-
-    Raises
-    ------
-    InputError
-        When it has none.
-    """
+    """The take's poses (T, P); raises InputError when it has none."""
     if take.params is None or not len(take.labels):
         raise InputError(
             "/target/params", "poses of the character", "none", "Give a take that was retargeted."
@@ -171,13 +159,7 @@ def choose_frames(poses: FloatArray, count: int) -> list[int]:
 
 
 def require_same_length(faces: Sequence[Face]) -> None:
-    """Check that the same frame number means the same moment for all faces.
-
-    Raises
-    ------
-    InputError
-        Naming the first face that has another number of frames than the first.
-    """
+    """Raise InputError for the first face that has another number of frames than the first."""
     expected = len(faces[0].motion)
     for face in faces[1:]:
         if len(face.motion) != expected:
@@ -190,13 +172,7 @@ def require_same_length(faces: Sequence[Face]) -> None:
 
 
 def require_part(part: range, length: int) -> None:
-    """Check that a part of a performance lies in it.
-
-    Raises
-    ------
-    InputError
-        When it does not.
-    """
+    """Raise InputError unless a part of a performance lies in it."""
     if not part or part.start < 0 or part.stop > length:
         expected, found = f"a part of 0..{length - 1}", f"{part.start}..{part.stop - 1}"
         raise InputError("--frames", expected, found, "Choose another.")

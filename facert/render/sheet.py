@@ -63,7 +63,10 @@ def render_sheet(
     with_markers = take is not None and take.source.kind == "markers"
     height, width = len(faces) + with_markers, len(frames)
     figure = Figure(figsize=(CELL * width + 0.4, CELL * height + 0.3), dpi=pixels / CELL)
-    grid = figure.subplots(height, width, squeeze=False, gridspec_kw=_margins(figure))
+    grid = figure.subplots(height, width, squeeze=False)
+    # Little space between the pictures, room for labels at the left and times on top.
+    wide, high = figure.get_size_inches()
+    figure.subplots_adjust(0.38 / wide, 0.02 / high, 1 - 0.02 / wide, 1 - 0.28 / high, 0.02, 0.02)
     for axes, time in zip(grid[0], faces[0].motion.time[frames], strict=True):
         axes.set_title(f"{time:.2f} s", fontsize=9, color=INK)
     if take is not None and with_markers:
@@ -155,13 +158,7 @@ def draw_points(mesh: Mesh, vertices: IntArray) -> Figure:
 
 
 def checked_frames(frames: Sequence[int], length: int) -> list[int]:
-    """The frames of a sheet, if they exist and are not too many.
-
-    Raises
-    ------
-    InputError
-        When they do not.
-    """
+    """The frames of a sheet; raises InputError when some do not exist, or they are too many."""
     if len(frames) > MAX_FRAMES:
         raise InputError(
             "--frames", f"at most {MAX_FRAMES} frames", f"{len(frames)}", "Draw several pictures."
@@ -219,16 +216,3 @@ def _draw_face(
 def _label(axes: Axes, text: str) -> None:
     style = {"rotation": 90, "ha": "right", "va": "center", "fontsize": 10, "color": INK}
     axes.text(-0.04, 0.5, text, style, transform=axes.transAxes)
-
-
-def _margins(figure: Figure) -> dict[str, float]:
-    """Little space between the pictures, room for labels at the left and times on top."""
-    width, height = figure.get_size_inches()
-    return {
-        "left": 0.38 / width,
-        "right": 1 - 0.02 / width,
-        "bottom": 0.02 / height,
-        "top": 1 - 0.28 / height,
-        "wspace": 0.02,
-        "hspace": 0.02,
-    }
