@@ -30,7 +30,7 @@ from facert.topology.solution import Dense, Elimination, Interpolant
 
 SURFACE = 2  # d
 SMOOTHNESS = 0.3  # λ of the uniform Laplacian
-PULL = 1e-6  # of what is carried, towards no rotation
+PULL = 1e-6  # towards no rotation: where the anchors of a carried part are few, or on a line
 DENSE = 2**25  # most entries of an influence matrix, 256 MiB
 Energy = Callable[[FloatArray, IntArray], sparse.csc_array]
 LooseParts = Literal["refuse", "carry"]
@@ -42,25 +42,21 @@ class DrivingMethod:
 
     Parameters
     ----------
-    summary : str
-        One line for a person who chooses.
     energy : callable, optional
         From vertices (V, 3) and faces (F, 3) to a quadratic energy (V, V).
-    kernel : str, optional
+    kernel : str
         The radial basis function, where there is no energy.
-    quantity : {"displacements", "positions"}
-        What is interpolated.
+    displacements : bool
+        Whether displacements are interpolated, or positions.
     """
 
-    summary: str
     energy: Energy | None = None
-    kernel: Kernel | None = None
-    quantity: Literal["displacements", "positions"] = "displacements"
+    kernel: Kernel = "linear"
+    displacements: bool = True
 
     def interpolant(self, vertices: FloatArray, faces: IntArray, labelled: IntArray) -> Interpolant:
-        """From the labelled vertices (M,) to all of them."""
+        """The map from the labelled vertices (M,) to all of them."""
         if self.energy is None:
-            assert self.kernel is not None
             return radial_basis(vertices, labelled, self.kernel)
         return Elimination(self.energy(vertices, faces), labelled)
 
@@ -80,19 +76,20 @@ def smooth_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:
     return sparse.csc_array(framework_energy(vertices, faces) + SMOOTHNESS * smoothness)
 
 
+def uniform_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:
+    """Laplacian editing with uniform weights, (V, V)."""
+    return laplacian.uniform_energy(faces, len(vertices))
+
+
 METHODS = {
-    "smooth": DrivingMethod("the framework with a uniform Laplacian", smooth_energy),
-    "framework": DrivingMethod("the paper's framework, on displacements", framework_energy),
-    "literal": DrivingMethod(
-        "equation (9) as it is written, on positions", framework_energy, quantity="positions"
-    ),
-    "laplacian": DrivingMethod(
-        "Laplacian editing, uniform weights", lambda v, f: laplacian.uniform_energy(f, len(v))
-    ),
-    "cotangent": DrivingMethod("Laplacian editing, cotangent weights", laplacian.cotangent_energy),
-    "biharmonic": DrivingMethod("bending of a thin sheet", laplacian.biharmonic_energy),
-    "rbf-linear": DrivingMethod("radial basis functions |r|", kernel="linear"),
-    "rbf-thin-plate": DrivingMethod("radial basis functions r² log r", kernel="thin_plate_spline"),
+    "smooth": DrivingMethod(smooth_energy),
+    "framework": DrivingMethod(framework_energy),
+    "literal": DrivingMethod(framework_energy, displacements=False),  # (9) as it is written
+    "laplacian": DrivingMethod(uniform_energy),
+    "cotangent": DrivingMethod(laplacian.cotangent_energy),
+    "biharmonic": DrivingMethod(laplacian.biharmonic_energy),
+    "rbf-linear": DrivingMethod(kernel="linear"),
+    "rbf-thin-plate": DrivingMethod(kernel="thin_plate_spline"),
 }
 """Every way to drive a face, the shipped default first."""
 
@@ -101,6 +98,10 @@ DEFAULT = "smooth"
 
 class FaceDriver:
     """A neutral face that follows its feature points, frame by frame or in batches.
+
+    Eyes, teeth and lashes that no feature point moves may follow the face rigidly: each part with
+    the rotation and the translation that fit best what its anchors do (Kabsch 1976), the vertices
+    of the labelled face that are nearest to it.
 
     Parameters
     ----------
@@ -133,10 +134,12 @@ class FaceDriver:
     ) -> None:
         self.neutral = _checked_neutral(neutral)
         self.labelled = checked_labels(labelled, len(neutral))
-        self._method = chosen_method(method)
-        displaced = self._method.quantity == "displacements"
-        self._rest = self.neutral if displaced else np.zeros_like(neutral)
-        self._followers: list[Follower] = []
+        if method not in METHODS:
+            known = ", ".join(METHODS)
+            raise InputError("method", f"one of {known}", repr(method), "Choose another.")
+        self._method = METHODS[method]
+        self._rest = neutral if self._method.displacements else np.zeros_like(neutral)
+        self._carried: list[tuple[IntArray, IntArray]] = []  # each part with its anchors
         held = np.full(len(neutral), True)
         if self._method.energy is not None:  # it reaches no farther than the mesh does
             held = self._held_by_labels(mesh_rings(faces, len(neutral)), loose)
@@ -144,12 +147,13 @@ class FaceDriver:
         self._interpolant = self._solve(faces)
 
     def _held_by_labels(self, rings: Neighbourhoods, loose: LooseParts) -> BoolArray:
-        """Which vertices are in parts with labels, (V,); the others follow, if they may."""
+        """Which vertices are in parts with labels, (V,); the others are carried, if they may."""
         if loose == "refuse":
             require_enough_labels(rings, self.labelled)
         lacking = lacking_components(rings, self.labelled)
         held = ~np.isin(rings.components, lacking)
-        self._followers = followers(self.neutral, rings.components, held)
+        if len(lacking):
+            self._carried = _parts_with_anchors(self.neutral, rings.components, held)
         return held
 
     def _solve(self, faces: IntArray) -> Interpolant:
@@ -191,26 +195,15 @@ class FaceDriver:
         given = points - self._rest[self.labelled]
         # One product for all frames: (V, M) times (M, 3 T).
         moved = self._interpolant(given.transpose(1, 0, 2)).transpose(1, 0, 2)
-        if not self._followers:
+        if not self._carried:
             return np.add(moved, self._rest, order="C")
         deformed = np.empty((len(points), *self.neutral.shape))
         deformed[:, self._held] = moved + self._rest[self._held]
-        for follower in self._followers:
-            follower.carry(self.neutral, deformed)
+        for part, anchors in self._carried:
+            followed = deformed[:, anchors]
+            motion = align(self.neutral[anchors], followed, np.ones(followed.shape[:2]), PULL)
+            deformed[:, part] = motion.apply(self.neutral[part])
         return deformed
-
-
-def chosen_method(name: str) -> DrivingMethod:
-    """The method of that name.
-
-    Raises
-    ------
-    InputError
-        When there is none.
-    """
-    if name not in METHODS:
-        raise InputError("method", f"one of {', '.join(METHODS)}", repr(name), "Choose another.")
-    return METHODS[name]
 
 
 def _checked_neutral(neutral: FloatArray) -> FloatArray:
@@ -221,37 +214,10 @@ def _checked_neutral(neutral: FloatArray) -> FloatArray:
     return neutral
 
 
-@dataclass(frozen=True, eq=False)
-class Follower:
-    """A part that follows its anchors.
-
-    Parameters
-    ----------
-    part : array of int, shape (n,)
-        Vertices that are carried.
-    anchors : array of int, shape (m,)
-        Vertices that they follow.
-    """
-
-    part: IntArray
-    anchors: IntArray
-
-    def carry(self, neutral: FloatArray, deformed: FloatArray) -> None:
-        """Move the part in every frame of `deformed` (T, V, 3), in place.
-
-        Parameters
-        ----------
-        neutral : array, shape (V, 3)
-        deformed : array, shape (T, V, 3)
-            With the anchors where they should be.
-        """
-        anchors = deformed[:, self.anchors]
-        motion = align(neutral[self.anchors], anchors, np.ones(anchors.shape[:2]), PULL)
-        deformed[:, self.part] = motion.apply(neutral[self.part])
-
-
-def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> list[Follower]:
-    """One for each connected component that is not held by labels.
+def _parts_with_anchors(
+    vertices: FloatArray, components: IntArray, held: BoolArray
+) -> list[tuple[IntArray, IntArray]]:
+    """The connected components that are not held by labels, each with its anchors.
 
     Parameters
     ----------
@@ -261,8 +227,6 @@ def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> li
     held : array of bool, shape (V,)
         Which vertices belong to a component with labels.
     """
-    if held.all():
-        return []
     candidates = np.flatnonzero(held)
     tree = cKDTree(vertices[candidates])
     found = []
@@ -272,5 +236,5 @@ def followers(vertices: FloatArray, components: IntArray, held: BoolArray) -> li
         # The nearest labelled component: a part between two does not follow both.
         home = components[candidates[nearest[distance.argmin()]]]
         near = candidates[nearest]
-        found.append(Follower(part, np.unique(near[components[near] == home])))
+        found.append((part, np.unique(near[components[near] == home])))
     return found

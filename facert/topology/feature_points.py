@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import NameIndex, nearest
+from facert.data.names import match
 from facert.data.rig import Mesh
-from facert.data.take import Take
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
 from facert.topology.labels import checked_labels
@@ -45,11 +45,7 @@ class FeaturePoints:
 
 
 def feature_points(
-    take: Take,
-    mesh: Mesh,
-    where: Where = "names",
-    rest: int = 0,
-    fit: Fit = "none",
+    take: Take, mesh: Mesh, where: Where = "names", rest: int = 0, fit: Fit = "none"
 ) -> FeaturePoints:
     """The markers of a take as feature points of a mesh.
 
@@ -66,7 +62,7 @@ def feature_points(
     rest : int
         The frame in which the face that the markers come from rests.
     fit : {"none", "uniform", "axes"}
-        How markers of another face are carried over.
+        How markers of another face are carried over, see `carried_over`.
 
     Raises
     ------
@@ -80,7 +76,8 @@ def feature_points(
         raise InputError("--rest", f"a frame from 0 to {len(take) - 1}", f"{rest}", "Choose one.")
     seen = np.flatnonzero(take.source.valid.any(axis=0))
     names = [take.source.names[point] for point in seen]
-    positions = _without_gaps(take.source.values[:, seen])
+    markers = Source(take.source.values[:, seen], tuple(names))
+    positions = without_gaps(markers).reshape(markers.values.shape)
     if where == "names":
         vertices = named_vertices(names)
     elif where == "nearest":
@@ -91,16 +88,20 @@ def feature_points(
     vertices = checked_labels(vertices, len(mesh.vertices))
     home = mesh.vertices[vertices]
     if fit == "none":
-        require_near(np.linalg.norm(positions[rest] - home, axis=1), mesh.vertices)
+        _require_near(np.linalg.norm(positions[rest] - home, axis=1), mesh.vertices)
+        return FeaturePoints(vertices, positions)
     return FeaturePoints(vertices, carried_over(positions, positions[rest], home, fit))
 
 
-def _without_gaps(positions: FloatArray) -> FloatArray:
-    flat = positions.reshape(len(positions), -1)
-    hidden = int(np.isnan(flat).sum()) // 3
+def without_gaps(source: Source) -> FloatArray:
+    """A source as a matrix in which hidden values are imputed from those that are seen, (T, D).
+
+    Every marker or weight must be observed in some frame.
+    """
+    hidden = np.count_nonzero(~source.valid)
     if hidden:
-        log.info("%d of %d positions were hidden: filled", hidden, flat.size // 3)
-    return fill_gaps(flat).reshape(positions.shape)
+        log.info("%d of %d positions were hidden: filled", hidden, source.valid.size)
+    return fill_gaps(source.matrix)
 
 
 def named_vertices(names: Sequence[str]) -> IntArray:
@@ -118,20 +119,20 @@ def named_vertices(names: Sequence[str]) -> IntArray:
             "names of the points",
             "vertices, such as v1204",
             repr(others[0]),
-            "Tell the vertex of each point with --map, or take the nearest ones with --auto.",
+            "Give the vertex of each point with --map, or take the nearest ones with --auto.",
         )
     return np.array([int(match[1]) for match in found if match], dtype=np.int64)
 
 
 def mapped_vertices(table: Mapping[str, object], names: Sequence[str]) -> tuple[IntArray, IntArray]:
-    """What a map from names to vertices says of some points.
+    """The points that a map names, and their vertices.
 
     Parameters
     ----------
     table : mapping
-        From the name of a point to its vertex; spellings are forgiven.
+        From the name of a point, in any spelling, to its vertex.
     names : sequence of str
-        Of the points that there are; those that the map leaves out are not used.
+        Of all points; those that the map leaves out are not used.
 
     Returns
     -------
@@ -142,23 +143,15 @@ def mapped_vertices(table: Mapping[str, object], names: Sequence[str]) -> tuple[
     InputError
         For a vertex that is no whole number, or a name that is not among the points.
     """
-    index = NameIndex(names)
-    points, vertices = [], []
     for name, vertex in table.items():
         if isinstance(vertex, bool) or not isinstance(vertex, int):
             raise InputError(
                 f"--map: {name}", "the number of a vertex", f"{vertex!r}", "As in chin = 1204."
             )
-        place = index.find(name)
-        if place is None:
-            near = nearest(name, names)
-            hint = f"nearest: {near!r}" if near else f"{len(names)} other names"
-            raise InputError(f"--map: {name}", "a point of the take", hint, "Correct the map.")
-        points.append(place)
-        vertices.append(vertex)
-    if not points:
+    if not table:
         raise InputError("--map", "lines such as chin = 1204", "none", "Name some points.")
-    return np.array(points, dtype=np.int64), np.array(vertices, dtype=np.int64)
+    vertices = np.array(list(table.values()), dtype=np.int64)
+    return match(list(table), names, "--map: points of the take"), vertices
 
 
 def nearest_vertices(rest: FloatArray, vertices: FloatArray) -> IntArray:
@@ -176,28 +169,16 @@ def nearest_vertices(rest: FloatArray, vertices: FloatArray) -> IntArray:
         When points lie far from the mesh, or share a vertex.
     """
     distance, found = map(np.asarray, cKDTree(vertices).query(rest))
-    require_near(distance, vertices)
+    _require_near(distance, vertices)
     unique, counts = np.unique(found, return_counts=True)
     if (counts > 1).any():
         raise InputError(
             "--auto",
             "a vertex for each point",
             f"vertex {unique[counts > 1][0]} nearest to several",
-            "Tell the vertices with --map.",
+            "Give the vertices with --map.",
         )
     return np.asarray(found, dtype=np.int64)
-
-
-def require_near(distance: FloatArray, vertices: FloatArray) -> None:
-    """Refuse points that, by their distances (M,), are not of this face."""
-    radius = float(np.sqrt(np.mean(np.sum((vertices - vertices.mean(axis=0)) ** 2, axis=1))))
-    if np.median(distance) > FAR * radius:
-        raise InputError(
-            "points",
-            "positions on the mesh when it rests",
-            f"half of them farther than {np.median(distance):.3g} from it",
-            "For another face's points, or other units, give --map (or v1204-names) and --fit.",
-        )
 
 
 def carried_over(points: FloatArray, rest: FloatArray, home: FloatArray, fit: Fit) -> FloatArray:
@@ -210,20 +191,29 @@ def carried_over(points: FloatArray, rest: FloatArray, home: FloatArray, fit: Fi
         The points when the face they come from rests.
     home : array, shape (M, 3)
         Their vertices on the neutral of the other face.
-    fit : {"none", "uniform", "axes"}
-        Leave the points as they are; or let s be the ratio of the faces' sizes, over all axes or
-        for each alone.
+    fit : {"uniform", "axes"}
+        Whether s is the ratio of the faces' sizes over all axes, or for each alone.
 
     Raises
     ------
     InputError
         When the points do not extend along an axis that is to be scaled.
     """
-    if fit == "none":
-        return points
     sizes = [np.std(each, axis=0) for each in (rest, home)]
     if fit == "uniform":
         sizes = [np.full(3, np.linalg.norm(size)) for size in sizes]
     if not (sizes[0] > 0).all():
         raise InputError("--fit", "points that spread in space", "flat ones", "Use uniform.")
     return np.asarray(home + sizes[1] / sizes[0] * (points - rest))
+
+
+def _require_near(distance: FloatArray, vertices: FloatArray) -> None:
+    """Refuse points that, by their distances (M,), are not of this face."""
+    radius = float(np.sqrt(np.mean(np.sum((vertices - vertices.mean(axis=0)) ** 2, axis=1))))
+    if np.median(distance) > FAR * radius:
+        raise InputError(
+            "points",
+            "positions on the mesh when it rests",
+            f"half of them farther than {np.median(distance):.3g} from it",
+            "For another face's points, or other units, give --map (or v1204-names) and --fit.",
+        )

@@ -12,15 +12,13 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.models.gaussian import fill_gaps
 from facert.preprocess.known_poses import pose_bounds
 from facert.settings import LimitRule
+from facert.topology.feature_points import without_gaps
 from facert.topology.keyed import KeyedPerformance
 from facert.topology.propagation import propagate
 
 log = logging.getLogger("facert")
-
-DEFAULT = "residual"
 
 
 @dataclass(frozen=True)
@@ -36,14 +34,15 @@ class Propagation:
         range of its key poses and animation.
     """
 
-    method: str = DEFAULT
+    method: str = "residual"
     width: int | None = None
     dim: int | None = None
     limits: LimitRule = "auto"
 
-    def run(self, take: KeyedPerformance) -> FloatArray:
-        """All frames (T, G, C)."""
-        return propagate(take, self.method, self.width, self.dim)
+    def run(self, source: FloatArray, keys: IntArray, labels: FloatArray) -> FloatArray:
+        """All frames (T, G, C) from source points (T, M, D) and key poses (K, G, C)."""
+        performance = KeyedPerformance(source, keys, labels)
+        return propagate(performance, self.method, self.width, self.dim)
 
 
 def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = None) -> Take:
@@ -60,7 +59,7 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     Returns
     -------
     Take
-        Clipped as `how` says.
+        Its poses are clipped to the limits of `how`.
 
     Raises
     ------
@@ -70,11 +69,10 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     if take.params is None or take.controls is None:
         raise InputError("/target/params", "poses of the key frames", "none", "Pose some frames.")
     chosen = _keys_with(take.params[:, :1, None], keys, "/target/params")
-    source = filled_source(take.source)[:, None, :]  # one point: a rig follows the whole face
-    performance = KeyedPerformance(source, chosen, take.params[chosen][:, None, :])
-    how = how or Propagation()
-    params = how.run(performance)[:, 0]
-    bounds = pose_bounds(take, take.params[chosen], how.limits)
+    source = _filled(take.source)[:, None, :]  # one point: a rig follows the whole face
+    poses, how = take.params[chosen], how or Propagation()
+    params = how.run(source, chosen, poses[:, None, :])[:, 0]
+    bounds = pose_bounds(take, poses, how.limits)
     if bounds is not None:
         params = np.clip(params, *bounds.T)
     return replace(take, params=params, std=None)
@@ -114,15 +112,13 @@ def propagate_positions(
             "Give the character's feature points, a row for each frame of the source.",
         )
     chosen = _keys_with(target.source.values, keys, "the target take's /source/markers")
-    labels = target.source.values[chosen]
+    points, labels = _filled(take.source), target.source.values[chosen]
     partners = _partners(take.source, target.source)
-    flat = filled_source(take.source)
     if partners is None:
-        performance = KeyedPerformance(flat[:, None, :], chosen, labels.reshape(len(chosen), 1, -1))
+        points, labels = points[:, None, :], labels.reshape(len(chosen), 1, -1)
     else:
-        points = flat.reshape(take.source.values.shape)[:, partners]
-        performance = KeyedPerformance(points, chosen, labels)
-    moved = (how or Propagation()).run(performance)
+        points = points.reshape(take.source.values.shape)[:, partners]
+    moved = (how or Propagation()).run(points, chosen, labels)
     source = target.source.with_matrix(moved.reshape(len(take), -1))
     return replace(
         take,
@@ -136,16 +132,8 @@ def propagate_positions(
     )
 
 
-def filled_source(source: Source) -> FloatArray:
-    """The source as a matrix without gaps, (T, D).
-
-    What a frame hides is guessed from what it shows, by all the other frames.
-
-    Raises
-    ------
-    InputError
-        For a marker or weight that is observed in no frame.
-    """
+def _filled(source: Source) -> FloatArray:
+    """The source as a matrix without gaps, (T, D); refused if nothing is known of a column."""
     lost = np.flatnonzero(~source.valid.any(axis=0))
     if len(lost):
         raise InputError(
@@ -154,10 +142,7 @@ def filled_source(source: Source) -> FloatArray:
             f"{source.names[lost[0]]!r} in none ({len(lost)} such)",
             "Remove it from the take.",
         )
-    hidden = np.count_nonzero(~source.valid)
-    if hidden:
-        log.info("%d of %d positions were hidden: filled", hidden, source.valid.size)
-    return fill_gaps(source.matrix)
+    return without_gaps(source)
 
 
 def _keys_with(values: FloatArray, keys: Sequence[int], field: str) -> IntArray:

@@ -10,7 +10,7 @@ clear directions this changes nothing, since affine maps cost nothing. Where it 
 is written keeps the target still along the others (`literal`, kept for comparison).
 
 Two terms may be added. A path Laplacian holds still windows together (`path`). And since a window
-knows nothing of another, where the same expression may have been posed, a regression on the whole
+does not reach another in which the same expression may have been posed, a regression on the whole
 performance may come first, of which the framework carries over what it leaves of the key poses
 (`residual`, the default).
 """
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -34,7 +35,7 @@ from facert.topology.laplacian import path_energy
 from facert.topology.local_ridge import local_ridge
 from facert.topology.neighbourhoods import temporal_windows
 from facert.topology.radial_basis import Kernel, radial_basis
-from facert.topology.solution import Elimination
+from facert.topology.solution import Elimination, Interpolant
 
 STILL = 0.01
 """At this share of a point's largest singular value, over all windows, motion is half noise."""
@@ -43,7 +44,7 @@ PATH = 0.1  # λ of the path Laplacian
 
 @dataclass(frozen=True)
 class Windows:
-    """What the framework takes to be near in time.
+    """Windows of time: the frames that are near each frame.
 
     Parameters
     ----------
@@ -55,25 +56,6 @@ class Windows:
 
     width: int = 15
     dim: int = 3
-
-
-@dataclass(frozen=True)
-class PropagationMethod:
-    """How key poses reach the other frames.
-
-    Parameters
-    ----------
-    summary : str
-        One line for a person who chooses.
-    run : callable
-        From a keyed performance and the windows to all frames, (T, G, C).
-    windows : Windows, optional
-        The ones that suit it; None for a method without windows.
-    """
-
-    summary: str
-    run: Callable[[KeyedPerformance, Windows], FloatArray]
-    windows: Windows | None = None
 
 
 def propagate(
@@ -101,38 +83,18 @@ def propagate(
     InputError
         For an unknown method, windows where there are none, or key frames that do not suffice.
     """
-    if method not in METHODS:
-        known = ", ".join(METHODS)
-        raise InputError("method", f"one of {known}", repr(method), "Choose another.")
-    chosen = METHODS[method]
-    if chosen.windows is None:
+    if method in WITHOUT_WINDOWS:
         if width is not None or dim is not None:
             raise InputError(
                 "--window, --dim", f"neither with {method}", "one of them", "Leave them out."
             )
-        return chosen.run(take, Windows())
-    windows = Windows(
-        chosen.windows.width if width is None else width,
-        chosen.windows.dim if dim is None else dim,
-    )
-    return chosen.run(take, windows)
-
-
-def framework(take: KeyedPerformance, windows: Windows) -> FloatArray:
-    """The paper's framework for each feature point, on displacements, (T, G, C)."""
-    return _displaced(take, windows, smoothness=0.0)
-
-
-def framework_and_path(take: KeyedPerformance, windows: Windows) -> FloatArray:
-    """The same with a path Laplacian, B + λ Lᵀ L, (T, G, C)."""
-    return _displaced(take, windows, smoothness=PATH)
-
-
-def literal(take: KeyedPerformance, windows: Windows) -> FloatArray:
-    """Equation (9) as it is written, on positions, (T, G, C)."""
-    needed = needed_labels(windows.dim, take.explaining.shape[2])
-    require_enough_labels(temporal_windows(len(take), windows.width), take.keys, needed)
-    return _solve(take, take.explaining, windows, smoothness=0.0)
+        return WITHOUT_WINDOWS[method](take)
+    if method not in WITH_WINDOWS:
+        known = ", ".join(METHODS)
+        raise InputError("method", f"one of {known}", repr(method), "Choose another.")
+    run, suited = WITH_WINDOWS[method]
+    windows = Windows(suited.width if width is None else width, suited.dim if dim is None else dim)
+    return run(take, windows)
 
 
 def framework_on_residual(take: KeyedPerformance, windows: Windows) -> FloatArray:
@@ -141,33 +103,27 @@ def framework_on_residual(take: KeyedPerformance, windows: Windows) -> FloatArra
     What is left is small and belongs to no feature point in particular, so that the windows are of
     whole frames: one matrix, one factorisation.
     """
-    guess = local_ridge(take)
-    return guess + _solve(take.less(guess), take.frames[None], windows, smoothness=0.0)
+    regressed = local_ridge(take)
+    return regressed + _solve(take.less(regressed), take.frames[None], windows)
 
 
-def _displaced(take: KeyedPerformance, windows: Windows, smoothness: float) -> FloatArray:
-    """The framework on what the scaled source leaves; parameters of a rig have no such source."""
+def framework(take: KeyedPerformance, windows: Windows, smoothness: float = 0.0) -> FloatArray:
+    """The paper's framework for each feature point, on displacements from the scaled source.
+
+    The parameters of a rig have no such source. With a smoothness λ, the energy is B + λ Lᵀ L, L
+    the path Laplacian, (T, G, C).
+    """
     if not take.by_point:
         return _solve(take, take.explaining, windows, smoothness)
-    guess = scaled_source(take)
-    return guess + _solve(take.less(guess), take.explaining, windows, smoothness)
+    scaled = scaled_source(take)
+    return scaled + _solve(take.less(scaled), take.explaining, windows, smoothness)
 
 
-def _solve(
-    take: KeyedPerformance, sources: FloatArray, windows: Windows, smoothness: float
-) -> FloatArray:
-    """The framework with sources (G, T, d), or one (1, T, d) for all, (T, G, C)."""
-    neighbourhoods = temporal_windows(len(take), windows.width)
-    steady = smoothness * path_energy(len(take))
-    parts = np.array_split(take.labels, len(sources), axis=1)
-    solved = [
-        Elimination(
-            sparse.csc_array(alignment_matrix(X, neighbourhoods, windows.dim, STILL) + steady),
-            take.keys,
-        )(part)
-        for X, part in zip(sources, parts, strict=True)
-    ]
-    return np.concatenate(solved, axis=1)
+def literal(take: KeyedPerformance, windows: Windows) -> FloatArray:
+    """Equation (9) as it is written, on positions, (T, G, C)."""
+    needed = needed_labels(windows.dim, take.explaining.shape[2])
+    require_enough_labels(temporal_windows(len(take), windows.width), take.keys, needed)
+    return _solve(take, take.explaining, windows)
 
 
 def laplacian(take: KeyedPerformance) -> FloatArray:
@@ -179,19 +135,14 @@ def laplacian(take: KeyedPerformance) -> FloatArray:
             "parameters, which have no Laplacian in the source",
             "Choose another method.",
         )
-    guess = scaled_points(take)
-    steps = Elimination(path_energy(len(take)), take.keys)
-    return np.asarray(guess + steps(take.less(guess).labels))
+    scaled = scaled_points(take)
+    displacements = Elimination(path_energy(len(take)), take.keys)
+    return np.asarray(scaled + displacements(take.less(scaled).labels))
 
 
 def rbf(take: KeyedPerformance, kernel: Kernel) -> FloatArray:
-    """Radial basis functions of each feature point's position (the paper's [16])."""
-    parts = np.array_split(take.labels, len(take.explaining), axis=1)
-    solved = [
-        radial_basis(X, take.keys, kernel)(part)
-        for X, part in zip(take.explaining, parts, strict=True)
-    ]
-    return np.concatenate(solved, axis=1)
+    """Radial basis functions of each feature point's position (the paper's [16]), (T, G, C)."""
+    return _by_source(take, take.explaining, lambda X: radial_basis(X, take.keys, kernel))
 
 
 def spline(take: KeyedPerformance) -> FloatArray:
@@ -200,28 +151,46 @@ def spline(take: KeyedPerformance) -> FloatArray:
     return np.asarray(CubicSpline(take.keys[order], take.labels[order])(np.arange(len(take))))
 
 
-METHODS = {
-    "residual": PropagationMethod(
-        "a regression on the source, the framework on what it leaves",
-        framework_on_residual,
-        Windows(9, 5),
-    ),
-    "path": PropagationMethod("the framework with a path Laplacian", framework_and_path, Windows()),
-    "framework": PropagationMethod("the paper's framework, on displacements", framework, Windows()),
-    "literal": PropagationMethod("equation (9) as it is written, on positions", literal, Windows()),
-    "laplacian": PropagationMethod("Laplacian editing in time", lambda take, _: laplacian(take)),
-    "rbf-linear": PropagationMethod(
-        "radial basis functions |r|", lambda take, _: rbf(take, "linear")
-    ),
-    "rbf-thin-plate": PropagationMethod(
-        "radial basis functions r² log r", lambda take, _: rbf(take, "thin_plate_spline")
-    ),
-    "ridge": PropagationMethod(
-        "kernel ridge regression towards the scaled source", lambda take, _: local_ridge(take)
-    ),
-    "affine": PropagationMethod(
-        "affine regression on whole frames", lambda take, _: affine_regression(take)
-    ),
-    "spline": PropagationMethod("a cubic spline in time", lambda take, _: spline(take)),
+def _solve(
+    take: KeyedPerformance, sources: FloatArray, windows: Windows, smoothness: float = 0.0
+) -> FloatArray:
+    """The framework with sources (G, T, d), or one (1, T, d) for all, (T, G, C)."""
+    neighbourhoods = temporal_windows(len(take), windows.width)
+    steady = smoothness * path_energy(len(take))
+
+    def solution(X: FloatArray) -> Interpolant:
+        B = alignment_matrix(X, neighbourhoods, windows.dim, STILL)
+        return Elimination(sparse.csc_array(B + steady), take.keys)
+
+    return _by_source(take, sources, solution)
+
+
+def _by_source(
+    take: KeyedPerformance, sources: FloatArray, solution: Callable[[FloatArray], Interpolant]
+) -> FloatArray:
+    """All frames from the key poses, each by the interpolant of its source, (T, G, C)."""
+    parts = np.array_split(take.labels, len(sources), axis=1)
+    solved = [solution(X)(part) for X, part in zip(sources, parts, strict=True)]
+    return np.concatenate(solved, axis=1)
+
+
+WITH_WINDOWS: dict[str, tuple[Callable[[KeyedPerformance, Windows], FloatArray], Windows]] = {
+    "residual": (framework_on_residual, Windows(9, 5)),
+    "path": (partial(framework, smoothness=PATH), Windows()),
+    "framework": (framework, Windows()),
+    "literal": (literal, Windows()),
 }
+"""Methods of the framework, the shipped default first, each with the windows that suit it."""
+
+WITHOUT_WINDOWS: dict[str, Callable[[KeyedPerformance], FloatArray]] = {
+    "laplacian": laplacian,
+    "rbf-linear": partial(rbf, kernel="linear"),
+    "rbf-thin-plate": partial(rbf, kernel="thin_plate_spline"),
+    "ridge": local_ridge,
+    "affine": affine_regression,
+    "spline": spline,
+}
+"""Methods to compare it with."""
+
+METHODS = (*WITH_WINDOWS, *WITHOUT_WINDOWS)
 """Every way to propagate, the shipped default first."""

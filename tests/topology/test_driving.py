@@ -11,7 +11,7 @@ from facert.topology.driving import METHODS, FaceDriver
 from facert.topology.suggested_points import suggest_points
 
 LABELLED = np.array([0, 7, 64, 71, 27, 30, 44])
-LINEAR = [name for name, method in METHODS.items() if method.quantity == "displacements"]
+LINEAR = [name for name, method in METHODS.items() if method.displacements]
 ENERGIES = [name for name in LINEAR if METHODS[name].energy]
 
 
