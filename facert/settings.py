@@ -87,6 +87,10 @@ class Settings:
     target_noise_floor: Annotated[
         float, About("Least noise variance of the poses: how exactly they are meant.", FINE, 0)
     ] = 0.05
+    source_kernel: Annotated[
+        str, About("Kernel of the source: squared-exponential, or matern-5/2.", SHARED)
+    ] = "squared-exponential"
+    target_kernel: Annotated[str, About("The same of the poses.", SHARED)] = "squared-exponential"
     limits: Annotated[
         LimitRule,
         About("Clip poses: to declared limits, else to the range of all poses (auto), or not."),

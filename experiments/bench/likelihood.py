@@ -1,6 +1,6 @@
 """Value and gradient of the likelihood, beside its LAPACK and BLAS calls and other libraries.
 
-Ours is measured as training calls it on the CPU (`facert.models.gplvm.energy`), and as a function
+Ours is measured as training calls it on the CPU (`facert.models.gplvm.module`), and as a function
 of torch that is differentiated by torch, which costs some calls more.
 
 GPy and GPyTorch are measured where they are installed. Each evaluates -log P(X|Z) of 120 columns
@@ -21,6 +21,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from experiments.bench.figure import Call, Figure, cpu_seconds
 from facert.data.arrays import FloatArray
+from facert.models.closed_form import closed_form
 from facert.models.gp.lapack import value_and_gradient
 from facert.models.gp.likelihood import compact_factor, negative_log_likelihood
 
@@ -58,7 +59,7 @@ def through_torch(problem: Problem) -> Call:
     F = compact_factor(torch.from_numpy(problem.X))
 
     def call() -> object:
-        value = negative_log_likelihood(Z, log_kernel, F, COLUMNS)
+        value = closed_form(lambda *v: negative_log_likelihood(*v, F, COLUMNS), Z, log_kernel)
         return torch.autograd.grad(value, [Z, log_kernel])
 
     return call

@@ -30,8 +30,8 @@ from facert.data.normalisation import Normalisation
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.registry import make_method
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
-from facert.models.gplvm.sparse_module import SparseSharedGPLVM
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.sparse_view import SparseView
 
 FOLDER = Path(__file__).resolve().parent
 COUNTS = (50, 100, 200, 500, 1000, 2000, 4000)
@@ -91,10 +91,15 @@ def cost(count: int, runs: int) -> Cost:
     M = constraint_matrix(data.X, data.Y, LABELS, 8)
     points = LABELS + 2 * count
     Z = np.random.default_rng(0).normal(size=(points, LATENT))
-    given = (data.X, data.Y, LABELS, M, Z, *FLOORS)
-    sparse = milliseconds(SparseSharedGPLVM(*given, inducing=INDUCING), runs)
-    exact = milliseconds(SharedGPLVM(*given), runs) if count <= MOST_EXACT else None
-    return Cost(count, exact, sparse)
+    given = list(zip((data.X, data.Y), view_rows(LABELS, count, count), FLOORS, strict=True))
+    small = [
+        SparseView(*view, latents=Z[view[1]], labelled=LABELS, inducing=INDUCING) for view in given
+    ]
+    sparse = milliseconds(SharedGPLVM(*small, M, Z), runs)
+    if count > MOST_EXACT:
+        return Cost(count, None, sparse)
+    exact = SharedGPLVM(*(GaussianView(*view) for view in given), M, Z)
+    return Cost(count, milliseconds(exact, runs), sparse)
 
 
 def draw_curves(costs: list[Cost]) -> Figure:

@@ -44,7 +44,7 @@ def by_scipy(name: str, settings: Settings, target: float) -> Call:
             raise StopIteration
 
     def call() -> FloatArray:
-        objective = FlatObjective(method._exact_module(X, Y, len(labelled.X)))
+        objective = FlatObjective(method._module(X, Y, len(labelled.X), "exact"))
         start, options = objective.vector, {"maxiter": MOST}
         found = minimize(objective, start, jac=True, method=name, callback=reached, options=options)
         return np.asarray(found.x)
@@ -57,7 +57,7 @@ def start(settings: Settings) -> Call:
     labelled, unlabelled = bench_data()
     X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
     method = SemiSupervisedSGPLVM(with_noise(settings, X))
-    return lambda: method._exact_module(X, Y, len(labelled.X))
+    return lambda: method._module(X, Y, len(labelled.X), "exact")
 
 
 def another_label(settings: Settings) -> Call:

@@ -2,7 +2,7 @@
 
 Small sets are trained exactly, as in the paper. Of large ones a core is, and the others are then
 joined to it (`facert.models.gplvm.staging`) in a model with inducing latents, in which they weigh
-no more than a hundred rows of each view (`facert.models.gplvm.sparse_module`): as every row counts
+no more than a hundred rows of each view (`facert.models.gplvm.sparse_view`): as every row counts
 alike in the exact model, hundreds without a partner overrule the labels, and the error rises.
 """
 
@@ -30,18 +30,14 @@ from facert.models.device import find_device
 from facert.models.gp.posterior import Predictor
 from facert.models.gp.sparse import ApproximationName
 from facert.models.gplvm.alignment import align, principal_components
-from facert.models.gplvm.device_mapping import (
-    DevicePredictor,
-    DeviceSourceMapping,
-    map_to_target_on,
-)
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
 from facert.models.gplvm.source_mapping import Mapped, Observation, SourceMapping
-from facert.models.gplvm.sparse_module import SparseSharedGPLVM
+from facert.models.gplvm.sparse_view import SparseView
 from facert.models.gplvm.staging import Core, Start
 from facert.models.gplvm.target_mapping import map_to_target
 from facert.models.gplvm.training import train
+from facert.models.kernels import kernel_class
 from facert.models.optim.base import Result
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
@@ -77,6 +73,10 @@ class SemiSupervisedSGPLVM:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = self._given = settings
+        self._kernels = (
+            kernel_class(settings.source_kernel, "source_kernel"),
+            kernel_class(settings.target_kernel, "target_kernel"),
+        )
         self._begin: Start | None = None
 
     @property
@@ -111,7 +111,7 @@ class SemiSupervisedSGPLVM:
             module = self._module(X, Y, count, likelihood).to(device)
             fingerprint = _fingerprint(X, Y, self.settings)
             result = self._train(module, fingerprint, monitor or Monitor())
-            self._set_views(module.source_posterior(X), module.target_posterior(Y))
+            self._set_views(*module.posteriors())
         residual = self.predict(labelled.X).Y - labelled.Y
         errors = {"training reconstruction": rms(residual)}
         return Report(result, self._figures(unlabelled), errors)
@@ -127,8 +127,8 @@ class SemiSupervisedSGPLVM:
         if found.type == "cpu":
             return self
         there = copy(self)
-        there.mapping_ = DeviceSourceMapping(self.source_, found)
-        there.to_poses_ = partial(map_to_target_on, DevicePredictor(self.target_, found))
+        there.mapping_ = SourceMapping(self.source_, found)
+        there.to_poses_ = partial(map_to_target, self.target_.on(found))
         return there
 
     def stream(self) -> Stream:
@@ -153,7 +153,10 @@ class SemiSupervisedSGPLVM:
         """
         if self.settings.sigma_c is None or self.settings.sigma_t is None:
             raise InputError("settings", "numbers as sigma_c and sigma_t", "none", DAMAGED)
-        views = [view_from(arrays, name) for name in ("source", "target")]
+        views = [
+            view_from(arrays, name, kernel)
+            for name, kernel in zip(("source", "target"), self._kernels, strict=True)
+        ]
         if views[0].Z.shape[1] != views[1].Z.shape[1]:
             dimensions = [view.Z.shape[1] for view in views]
             raise InputError(
@@ -163,7 +166,7 @@ class SemiSupervisedSGPLVM:
 
     def _set_views(self, source: Predictor, target: Predictor) -> None:
         self.source_, self.target_ = source, target
-        self.mapping_: SourceMapping = SourceMapping(source)
+        self.mapping_ = SourceMapping(source)
         self.to_poses_ = partial(map_to_target, target)
 
     def _observed(self, frames: FloatArray, input_variance: FloatArray | None) -> Observation:
@@ -179,40 +182,61 @@ class SemiSupervisedSGPLVM:
     def _module(
         self, X: FloatArray, Y: FloatArray, labelled: int, likelihood: ChosenLikelihood
     ) -> SharedGPLVM:
-        """What is to be trained, at its initial parameters.
+        """The model to be trained, at its initial parameters.
 
         They are those of the model to begin at. Without one, a small model begins at the alignment
         of both views, and a large one at a small one.
         """
         latent_dim = self._latent_dim(len(X) + len(Y) - labelled)
-        begin = self._begin
-        if begin is not None and begin.latent_dim != latent_dim:
+        if self._begin is not None and self._begin.latent_dim != latent_dim:
             log.info("more data carries more latent dimensions: training begins anew")
-            begin = self._begin = None
+            self._begin = None
+        begin = self._begin
+        if begin is None and likelihood != "exact":
+            begin = self._trained_core(X, Y, labelled)
+        M = self._constraints(X, Y, labelled)
+        Z = self._aligned(X, Y, M, latent_dim) if begin is None else begin.latents(X, Y, labelled)
+        views = self._views(X, Y, labelled, Z, likelihood)
+        if begin is not None:
+            for view, kernel in zip(views, begin.kernels, strict=True):
+                view.begin_with(kernel)
+        return SharedGPLVM(*views, M, Z)
+
+    def _views(
+        self,
+        X: FloatArray,
+        Y: FloatArray,
+        labelled: int,
+        Z: FloatArray,
+        likelihood: ChosenLikelihood,
+    ) -> tuple[GaussianView, GaussianView]:
+        settings = self.settings
+        assert settings.source_noise_floor is not None  # filled in before
+        floors = settings.source_noise_floor, settings.target_noise_floor
+        rows = view_rows(labelled, len(X) - labelled, len(Y) - labelled)
+        given = zip((X, Y), rows, floors, self._kernels, strict=True)
         if likelihood == "exact":
-            return self._exact_module(X, Y, labelled, begin)
-        begin = begin or self._trained_core(X, Y, labelled)
-        module = SparseSharedGPLVM(
-            X,
-            Y,
-            labelled,
-            self._constraints(X, Y, labelled),
-            begin.latents(X, Y, labelled),
-            *self._noise_floors,
-            inducing=self.settings.inducing,
-            approximation=likelihood,
+            source, target = (GaussianView(*view) for view in given)
+            return source, target
+        source, target = (
+            SparseView(
+                *view,
+                latents=Z[view[1]],
+                labelled=labelled,
+                inducing=settings.inducing,
+                approximation=likelihood,
+            )
+            for view in given
         )
-        module.begin_with(*begin.kernels)
-        return module
+        return source, target
 
     def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int) -> Start:
         core = Core.of(X, Y, labelled)
         X, Y = X[core.rows_x], Y[core.rows_y]
-        small = self._exact_module(X, Y, core.labelled)
-        begun = self._train(small.to(find_device(self.settings.device)), "", Monitor())
-        if begun.status == "interrupted":  # there is no model yet that could be kept
+        small = self._module(X, Y, core.labelled, "exact").to(find_device(self.settings.device))
+        if self._train(small, "", Monitor()).status == "interrupted":  # there is no model to keep
             raise KeyboardInterrupt
-        return Start.at(small.source_posterior(X), small.target_posterior(Y))
+        return Start.at(*small.posteriors())
 
     def _likelihood(self, X: FloatArray, Y: FloatArray, labelled: int) -> ChosenLikelihood:
         """The setting; where that is left open, exact while there is no more than a core."""
@@ -220,29 +244,11 @@ class SemiSupervisedSGPLVM:
             return self.settings.likelihood
         return "exact" if Core.of(X, Y, labelled).is_all_of(X, Y) else "vfe"
 
-    def _exact_module(
-        self, X: FloatArray, Y: FloatArray, labelled: int, begin: Start | None = None
-    ) -> SharedGPLVM:
-        M = self._constraints(X, Y, labelled)
-        if begin is None:
-            Z = self._aligned(X, Y, M, self._latent_dim(len(X) + len(Y) - labelled))
-            return SharedGPLVM(X, Y, labelled, M, Z, *self._noise_floors)
-        module = SharedGPLVM(X, Y, labelled, M, begin.latents(X, Y, labelled), *self._noise_floors)
-        module.begin_with(*begin.kernels)
-        return module
-
     def _latent_dim(self, points: int) -> int:
         latent_dim = min(self.settings.latent_dim, points - 1)
         if latent_dim < self.settings.latent_dim:
             log.warning("%d points carry only %d latent dimensions", points, latent_dim)
         return latent_dim
-
-    @property
-    def _noise_floors(self) -> tuple[float, float]:
-        """Of source and target."""
-        floor_x, floor_y = self.settings.source_noise_floor, self.settings.target_noise_floor
-        assert floor_x is not None  # filled in before
-        return floor_x, floor_y
 
     def _constraints(self, X: FloatArray, Y: FloatArray, labelled: int) -> csr_array | None:
         """Of the latent prior, Eq. (6)."""
@@ -326,7 +332,7 @@ class _SharedStream:
             sigma_t = self.method.settings.sigma_t
             assert sigma_t is not None  # filled in by fit, checked by load
             observed = observed.following(self.previous.x, sigma_t)
-            self.previous = mapping.follow(observed, self.previous.z, self.previous.stand)
+            self.previous = mapping.follow(observed, self.previous.z, self.previous.linearised)
         return self.method._to_target(self.previous)
 
 
@@ -338,6 +344,8 @@ def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
     shaping = (
         settings.method,
         settings.latent_dim,
+        settings.source_kernel,
+        settings.target_kernel,
         settings.neighbours,
         round(settings.source_noise_floor or 0.0, 6),
         settings.target_noise_floor,

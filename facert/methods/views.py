@@ -14,7 +14,7 @@ from facert.data.array_group import DAMAGED, check_axes
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.models.gp.posterior import Posterior, Predictor
-from facert.models.kernels import SquaredExponential
+from facert.models.kernels import Kernel
 
 EXACT = {"latents": "nq", "observations": "nd", "kernel": "3"}
 SPARSE = {"latents": "mq", "whitener": "mm", "weights": "md", "kernel": "3"}
@@ -32,7 +32,7 @@ def view_arrays(view: Predictor) -> dict[str, FloatArray]:
     return arrays | {"whitener": view.whitener, "weights": np.ascontiguousarray(view.alpha)}
 
 
-def view_from(arrays: Mapping[str, FloatArray], name: str) -> Predictor:
+def view_from(arrays: Mapping[str, FloatArray], name: str, kernel_type: type[Kernel]) -> Predictor:
     """A view from the arrays of a file, where they bear its name.
 
     Raises
@@ -47,7 +47,7 @@ def view_from(arrays: Mapping[str, FloatArray], name: str) -> Predictor:
     theta = own["kernel"]
     if not (theta > 0).all():
         raise InputError(f"{name}.kernel", "three positive numbers", f"{theta}", DAMAGED)
-    kernel = SquaredExponential(*theta.tolist())
+    kernel = kernel_type(*theta.tolist())
     if sparse:
         return Predictor(own["latents"], own["whitener"], own["weights"], kernel)
     return Posterior(own["latents"], own["observations"], kernel)

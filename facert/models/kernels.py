@@ -43,7 +43,8 @@ Array = TypeVar("Array", FloatArray, "Tensor")
 class Kernel(ABC):
     """A kernel with fixed parameters.
 
-    Its functions take arrays and tensors of any shape.
+    Its functions take squared distances as arrays or tensors of any shape. Rounding may have taken
+    those of points that agree below zero.
 
     Parameters
     ----------
@@ -61,20 +62,21 @@ class Kernel(ABC):
 
     @abstractmethod
     def value(self, squared: Array) -> Array:
-        """k(s), without the noise, at squared distances s >= 0."""
+        """k(s), without the noise."""
 
     @abstractmethod
-    def slope(self, squared: Array, k: Array) -> Array:
-        """dk/ds, from k(s), which it is proportional to: a weighted k gives the weighted slope."""
+    def relative_slope(self, squared: Array) -> Array | float:
+        """k'/k; a float where it is the same everywhere."""
 
     @abstractmethod
-    def curvature(self, squared: Array, k: Array) -> Array:
-        """d²k/ds², from k(s) in the same manner."""
+    def relative_curvature(self, squared: Array) -> Array | float:
+        """k''/k in the same manner."""
 
     @classmethod
     def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Self:
         """From (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
-        variance, inverse_width, excess = np.exp(log_kernel).tolist()
+        with np.errstate(over="ignore"):  # the factorisation refuses what is infinite
+            variance, inverse_width, excess = np.exp(log_kernel).tolist()
         return cls(variance, inverse_width, excess + noise_floor)
 
     def to_log(self, noise_floor: float) -> FloatArray:
@@ -94,7 +96,7 @@ class Kernel(ABC):
         """The kernel without noise between two sets, (n, q) and (N, q), giving (n, N)."""
         squared = np.sum(Z * Z, axis=1)[:, None] + np.sum(Z_train * Z_train, axis=1)
         squared -= 2.0 * (Z @ Z_train.T)
-        return self.value(np.maximum(squared, 0.0, out=squared))
+        return self.value(squared)
 
     def prior_variance(self, Z: FloatArray) -> FloatArray:
         """The kernel without noise of each row with itself, (n,)."""
@@ -109,7 +111,8 @@ class Kernel(ABC):
 
 def squared_exponential(squared: Array, variance: Any, inverse_width: Any) -> Array:
     """θ1 exp(-θ2/2 s), Eq. (3); the parameters are numbers, or arrays that broadcast."""
-    k: Array = _exp(squared * (-0.5 * inverse_width)) * variance
+    k: Array = _exp(squared * (-0.5 * inverse_width))
+    k *= variance
     return k
 
 
@@ -121,13 +124,13 @@ class SquaredExponential(Kernel):
         """k(s)."""
         return squared_exponential(squared, self.variance, self.inverse_width)
 
-    def slope(self, squared: Array, k: Array) -> Array:  # noqa: ARG002  k tells all
-        """The slope, -θ2/2 k."""
-        return k * (-0.5 * self.inverse_width)
+    def relative_slope(self, squared: Array) -> float:  # noqa: ARG002  the same everywhere
+        """k'/k = -θ2/2."""
+        return -0.5 * self.inverse_width
 
-    def curvature(self, squared: Array, k: Array) -> Array:  # noqa: ARG002
-        """The curvature, θ2²/4 k."""
-        return k * (0.25 * self.inverse_width**2)
+    def relative_curvature(self, squared: Array) -> float:  # noqa: ARG002
+        """k''/k = θ2²/4."""
+        return 0.25 * self.inverse_width**2
 
 
 @dataclass(frozen=True)
@@ -142,18 +145,18 @@ class Matern52(Kernel):
         a, p = self._polynomial(squared)
         return p * _exp(-a) * self.variance
 
-    def slope(self, squared: Array, k: Array) -> Array:
-        """The slope, -5/6 θ2 (1 + a)/p(a) k."""
+    def relative_slope(self, squared: Array) -> Array:
+        """k'/k = -5/6 θ2 (1 + a)/p(a)."""
         a, p = self._polynomial(squared)
-        return k * (a + 1.0) / p * (-5.0 / 6.0 * self.inverse_width)
+        return (a + 1.0) / p * (-5.0 / 6.0 * self.inverse_width)
 
-    def curvature(self, squared: Array, k: Array) -> Array:
-        """The curvature, 25/12 θ2²/p(a) k."""
+    def relative_curvature(self, squared: Array) -> Array:
+        """k''/k = 25/12 θ2²/p(a)."""
         _, p = self._polynomial(squared)
-        return k / p * (25.0 / 12.0 * self.inverse_width**2)
+        return 25.0 / 12.0 * self.inverse_width**2 / p
 
     def _polynomial(self, squared: Array) -> tuple[Array, Array]:
-        a = squared**0.5 * math.sqrt(5.0 * self.inverse_width)
+        a = squared.clip(0.0) ** 0.5 * math.sqrt(5.0 * self.inverse_width)
         return a, a * (a / 3.0 + 1.0) + 1.0
 
 

@@ -10,30 +10,26 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg.blas import dsymm, dsyrk
+from scipy.linalg.blas import dsymm, dsymv, dsyrk
 from scipy.linalg.lapack import dlauum
 
 from facert.data.arrays import FloatArray
 from facert.models.gp.jitter import inverted, lower_factor
+from facert.models.kernels import Kernel, SquaredExponential
 
 
 def value_and_gradient(
-    Z: FloatArray, log_kernel: FloatArray, F: FloatArray, columns: int, noise_floor: float
+    Z: FloatArray,
+    log_kernel: FloatArray,
+    F: FloatArray,
+    columns: int,
+    noise_floor: float,
+    kernel: type[Kernel] = SquaredExponential,
 ) -> tuple[float, FloatArray, FloatArray]:
     """-log P(X|Z) and its derivatives with respect to Z and the log-kernel parameters.
 
-    Parameters
-    ----------
-    Z : array, shape (n, q)
-        Positions.
-    log_kernel : array, shape (3,)
-        (log θ1, log θ2, log of the noise variance above the floor).
-    F : array, shape (n, r)
-        F Fᵀ = X Xᵀ, C-contiguous.
-    columns : int
-        d, the number of columns of X.
-    noise_floor : float
-        Least noise variance.
+    Parameters are those of `facert.models.gp.likelihood.negative_log_likelihood`, as arrays, F
+    C-contiguous.
 
     Returns
     -------
@@ -49,36 +45,37 @@ def value_and_gradient(
     n = len(Z)
     # Parameters far off overflow; `lower_factor` then finds what cannot be factorised.
     with np.errstate(over="ignore", invalid="ignore"):
-        _, theta2, excess = np.exp(log_kernel).tolist()
-        K_smooth = _smooth_kernel(Z, float(log_kernel[0]), theta2)
-        K = K_smooth.copy(order="F")
-        np.einsum("nn->n", K)[...] += excess + noise_floor  # einsum: a view of the diagonal
+        k = kernel.from_log(log_kernel, noise_floor)
+        squared = _squared_distances(Z)
+        K = k.value(squared)
+        diagonal = np.einsum("nn->n", K)  # a view
+        diagonal += k.noise
     L = lower_factor(K)
+    diagonal[...] = k.variance  # from here on K is without its noise
     log_determinant = 2.0 * float(np.log(L.diagonal()).sum())
     K_inverse, _ = dlauum(inverted(L), lower=1, overwrite_c=1)  # L⁻ᵀ L⁻¹
     # Fᵀ and Aᵀ: what is C-contiguous to NumPy is their transpose to Fortran.
     A_T = dsymm(1.0, K_inverse, F.T, side=1, lower=1)
     value = 0.5 * (
         columns * log_determinant + float(np.vdot(F, A_T.T)) + n * columns * math.log(2.0 * math.pi)
-    )
+    )  # Eq. (1)
 
     G = dsyrk(-0.5, A_T, beta=0.5 * columns, c=K_inverse, trans=1, lower=1, overwrite_c=1)
-    d_excess = excess * float(G.diagonal().sum())
-    W = np.multiply(G, K_smooth, out=G)
-    product = dsymm(1.0, W, np.column_stack([Z, np.ones(n)]).T, side=1, lower=1).T
-    row_sums = product[:, -1]
-    dZ = (-2.0 * theta2) * (row_sums[:, None] * Z - product[:, :-1])
-    d_log_kernel = np.array([row_sums.sum(), 0.5 * float(np.vdot(Z, dZ)), d_excess])
-    return value, dZ, d_log_kernel
+    d_noise = math.exp(log_kernel[2]) * float(G.diagonal().sum())
+    W, ones = np.multiply(G, K, out=G), np.ones(n)
+    d_variance = float(dsymv(1.0, W, ones, lower=1).sum())
+    V = np.multiply(W, k.relative_slope(squared), out=W)
+    product = dsymm(4.0, V, np.column_stack([Z, ones]).T, side=1, lower=1).T
+    dZ = product[:, -1:] * Z - product[:, :-1]
+    return value, dZ, np.array([d_variance, 0.5 * float(np.vdot(Z, dZ)), d_noise])
 
 
-def _smooth_kernel(Z: FloatArray, log_theta1: float, theta2: float) -> FloatArray:
-    """K without its noise, (n, n), in Fortran's order."""
-    half = -0.5 * theta2 * np.einsum("nq,nq->n", Z, Z)
-    ones = np.ones(len(Z))
-    # log θ1 - θ2/2 (|z_i|² + |z_j|² - 2 z_i z_j) in one product.
-    left = np.column_stack([Z, half + log_theta1, ones])
-    right = np.column_stack([theta2 * Z, ones, half])
-    K: FloatArray = (right @ left.T).T
-    np.fill_diagonal(K, log_theta1)  # rounding must not make it anything else
-    return np.exp(K, out=K)
+def _squared_distances(Z: FloatArray) -> FloatArray:
+    """|z_i - z_j|² to rounding, (n, n), in Fortran's order, zero on the diagonal."""
+    squares, ones = np.einsum("nq,nq->n", Z, Z), np.ones(len(Z))
+    # |z_i|² + |z_j|² - 2 z_i z_j in one product.
+    S: FloatArray = (
+        np.column_stack([-2.0 * Z, ones, squares]) @ np.column_stack([Z, squares, ones]).T
+    )
+    np.fill_diagonal(S, 0.0)  # rounding must not make it anything else
+    return S.T

@@ -1,14 +1,29 @@
-"""A trained Gaussian process and its predictions, Eqs. (16) to (18), with derivatives."""
+"""A trained Gaussian process and its predictions, Eqs. (16) to (18), with derivatives.
+
+The formulas hold for NumPy's arrays and for torch's tensors alike: a predictor that was moved to a
+device (`Predictor.on`) holds tensors wherever arrays are written here.
+"""
 
 from __future__ import annotations
 
+import sys
+from copy import copy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.models.gp.jitter import whitener
 from facert.models.kernels import Kernel
+
+if TYPE_CHECKING:  # importing it takes seconds: not for those that stay on the CPU
+    import torch
+
+
+def namespace(array: FloatArray) -> Any:
+    """NumPy, or torch for a tensor."""
+    return np if isinstance(array, np.ndarray) else sys.modules["torch"]
 
 
 @dataclass(frozen=True)
@@ -21,8 +36,10 @@ class PosteriorPoint:
         μ, Eq. (16) or (18).
     variance : array, shape (B,)
         σ², Eq. (17), the same for every column of the observations.
-    offsets : array, shape (B, N, q)
+    offsets : array, shape (B, q, N)
         z - z_i for every position that predictions are made from.
+    squared : array, shape (B, N)
+        |z - z_i|².
     k : array, shape (B, N)
         k(z), the kernel against these positions.
     whitened : array, shape (B, N)
@@ -32,6 +49,7 @@ class PosteriorPoint:
     mean: FloatArray
     variance: FloatArray
     offsets: FloatArray
+    squared: FloatArray
     k: FloatArray
     whitened: FloatArray
 
@@ -55,10 +73,32 @@ class Predictor:
         self, Z: FloatArray, whitener: FloatArray, alpha: FloatArray, kernel: Kernel
     ) -> None:
         self.Z, self.kernel = Z, kernel
+        self.device: torch.device | None = None
         # [Tᵀ | α]: one product with k gives variance and mean. |T k|² keeps far more digits
         # than kᵀK⁻¹k, which matters where the noise is small against θ1.
         self.stacked: FloatArray = np.ascontiguousarray(np.hstack([whitener.T, alpha]))
         self.whitener = np.ascontiguousarray(whitener)
+        self.Z_T = np.ascontiguousarray(Z.T)
+        self.identity = np.eye(len(self.Z_T))
+
+    def on(self, device: torch.device) -> Self:
+        """The same on a torch device; it takes tensors, see `there`, and returns them."""
+        moved = copy(self)
+        moved.device = device
+        for name in ("Z", "stacked", "whitener", "Z_T", "identity"):
+            setattr(moved, name, moved.there(getattr(self, name)))
+        return moved
+
+    def there(self, array: FloatArray) -> FloatArray:
+        """An array as this predictor takes it: a tensor on its device, if it has one."""
+        if self.device is None:
+            return array
+        tensor = sys.modules["torch"].from_numpy(np.ascontiguousarray(array)).to(self.device)
+        return cast(FloatArray, tensor)
+
+    def here(self, array: FloatArray) -> FloatArray:
+        """The inverse of `there`."""
+        return array if self.device is None else cast("torch.Tensor", array).cpu().numpy()
 
     @property
     def alpha(self) -> FloatArray:
@@ -72,16 +112,16 @@ class Predictor:
 
     def predict(self, z: FloatArray) -> PosteriorPoint:
         """Mean and variance of a new observation at z (B, q), noise included."""
-        n = len(self.Z)
-        offsets = z[:, None, :] - self.Z
-        squared = np.einsum("bnq,bnq->bn", offsets, offsets)
-        k = self.kernel.variance * np.exp(-0.5 * self.kernel.inverse_width * squared)
+        n, einsum = len(self.Z), namespace(z).einsum
+        offsets = z[:, :, None] - self.Z_T
+        squared = einsum("bqn,bqn->bn", offsets, offsets)
+        k = self.kernel.value(squared)
         product = k @ self.stacked
-        whitened, mean = product[:, :n], product[:, n:]
-        # Rounding can take the difference below the noise, which is its least value.
-        explained = np.einsum("bn,bn->b", whitened, whitened)
-        variance = self.kernel.noise + np.maximum(self.kernel.variance - explained, 0.0)
-        return PosteriorPoint(mean, variance, offsets, k, whitened)
+        whitened, mean = product[:, :n], product[:, n:]  # Eq. (16) or (18)
+        # Eq. (17). Rounding can take the difference below the noise, which is its least value.
+        explained = einsum("bn,bn->b", whitened, whitened)
+        variance = self.kernel.noise + (self.kernel.variance - explained).clip(0.0)
+        return PosteriorPoint(mean, variance, offsets, squared, k, whitened)
 
     def solve(self, at: PosteriorPoint) -> FloatArray:
         """TᵀT k, K⁻¹ k of an exact process, (B, N)."""
@@ -102,7 +142,7 @@ class Predictor:
         Returns
         -------
         G : array, shape (B, q, N)
-            ∂k_i/∂z = -θ2 (z - z_i) k_i.
+            ∂k_i/∂z = 2 k'_i (z - z_i).
         H : array, shape (B, q, N)
             G Tᵀ.
         J : array, shape (B, q, D)
@@ -112,7 +152,8 @@ class Predictor:
         G = self._kernel_jacobian(at)
         batch, q, _ = G.shape
         place = None if out is None else out[: batch * q]
-        product = np.matmul(G.reshape(-1, n), self.stacked, out=place).reshape(batch, q, -1)
+        product = namespace(G).matmul(G.reshape(-1, n), self.stacked, out=place)
+        product = product.reshape(batch, q, -1)
         return G, product[:, :, :n], product[:, :, n:]
 
     def mean_jacobian(self, at: PosteriorPoint) -> FloatArray:
@@ -124,8 +165,8 @@ class Predictor:
 
     def _kernel_jacobian(self, at: PosteriorPoint) -> FloatArray:
         """∂k/∂z, G of `jacobians`, (B, q, N)."""
-        weights = -self.kernel.inverse_width * at.k
-        return np.multiply(at.offsets.transpose(0, 2, 1), weights[:, None, :], order="C")
+        slopes: FloatArray = at.k * (2.0 * self.kernel.relative_slope(at.squared))
+        return at.offsets * slopes[:, None, :]
 
 
 class Posterior(Predictor):

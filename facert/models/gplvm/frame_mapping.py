@@ -1,6 +1,7 @@
 """Source mapping of a single frame, for streams: Newton's method without a batch around it.
 
-The formulas are those of `facert.models.gplvm.source_mapping`. Where a frame is followed from its
+The formulas are those of `facert.models.gplvm.source_mapping`, whose batches take twice as long
+for a single frame; tests hold the two against each other. Where a frame is followed from its
 predecessor's z two or three steps lead to the minimum, and what they cost is mostly the calls, not
 the arithmetic. So everything that is multiplied by [Tᵀ | α] is one product,
 
@@ -33,15 +34,16 @@ DECREMENT = 1e-4
 ROUNDING = 1e-7
 
 
-class View(NamedTuple):
-    """What the source view says at z (q,), whatever is observed.
+class ViewPoint(NamedTuple):
+    """Mean and variance of the source view at z (q,), whatever is observed.
 
     Parameters
     ----------
     z : array, shape (q,)
     offsets : array, shape (q, N)
         z - z_i of every position.
-    k : array, shape (N,)
+    squared, k : arrays, shape (N,)
+        |z - z_i|², and the kernel there.
     whitened : array, shape (N,)
         T k.
     mean : array, shape (d_x,)
@@ -52,16 +54,17 @@ class View(NamedTuple):
 
     z: FloatArray
     offsets: FloatArray
+    squared: FloatArray
     k: FloatArray
     whitened: FloatArray
     mean: FloatArray
     s: float
 
 
-class Stand(NamedTuple):
-    """A view with its slopes [H | J], (q, N + d_x): most of the work of a step."""
+class LinearisedView(NamedTuple):
+    """A point with its slopes [H | J], (q, N + d_x): most of the work of a step."""
 
-    view: View
+    point: ViewPoint
     slopes: FloatArray
 
 
@@ -78,19 +81,19 @@ class Descent(NamedTuple):
         ∇²F where the last step, which is tiny, was taken from.
     energy : float
         F(z*).
-    stand : Stand
-        Where that was: the next frame can begin there.
+    linearised : LinearisedView
+        The view there: the next frame can begin with it.
     """
 
     z: FloatArray
     x: FloatArray
     hessian: FloatArray
     energy: float
-    stand: Stand
+    linearised: LinearisedView
 
 
-class _Residual(NamedTuple):
-    """What a frame says of a view."""
+class _DataTerm(NamedTuple):
+    """F of a frame, and its weighted residual."""
 
     energy: float
     w: FloatArray
@@ -107,18 +110,12 @@ class FrameMapping:
     """
 
     def __init__(self, posterior: Predictor) -> None:
-        kernel = posterior.kernel
-        self._variance, self._noise, self._theta2 = (
-            kernel.variance,
-            kernel.noise,
-            kernel.inverse_width,
-        )
-        self._Z_T = np.ascontiguousarray(posterior.Z.T)
+        self._kernel = posterior.kernel
+        self._Z_T, self._identity = posterior.Z_T, posterior.identity
         self._stacked = posterior.stacked
-        self._identity = np.eye(len(self._Z_T))
 
     def descend(
-        self, stand: Stand, b: FloatArray, R: FloatArray, energy: float = math.inf
+        self, at: LinearisedView, b: FloatArray, R: FloatArray, energy: float = math.inf
     ) -> Descent | None:
         """Newton's method for the frame b (d_x,) seen with variance R (d_x,).
 
@@ -129,38 +126,39 @@ class FrameMapping:
             Hessian is not positive definite.
         """
         for _ in range(MOST_STEPS):
-            value, gradient, hessian = self.expand(stand, b, R)
+            value, gradient, hessian = self.expand(at, b, R)
             if not value <= energy + ROUNDING:
                 return None
             energy = value
             _, step, indefinite = dposv(hessian, gradient)
             if indefinite:
                 return None
-            z = stand.view.z - step
+            z = at.point.z - step
             if float(gradient @ step) < DECREMENT:
-                view = self.view(z)
-                end = _residual(view, b, R)
-                return Descent(z, view.mean - view.s * end.wr, hessian, end.energy, stand)
-            stand = self.stand(z)
+                point = self.point(z)
+                end = _data_term(point, b, R)
+                return Descent(z, point.mean - point.s * end.wr, hessian, end.energy, at)
+            at = self.linearise(z)
         return None
 
     def energy(self, z: FloatArray, b: FloatArray, R: FloatArray) -> float:
         """F(z)."""
-        return _residual(self.view(z), b, R).energy
+        return _data_term(self.point(z), b, R).energy
 
     def expand(
-        self, stand: Stand, b: FloatArray, R: FloatArray
+        self, at: LinearisedView, b: FloatArray, R: FloatArray
     ) -> tuple[float, FloatArray, FloatArray]:
         """F, ∇F (q,) and ∇²F (q, q) of a frame."""
-        (z, offsets, k, whitened, _, s), slopes = stand
+        (z, offsets, squared, k, whitened, _, s), slopes = at
         n = len(k)
         H, J = slopes[:, :n], slopes[:, n:]
-        value, w, wr = _residual(stand.view, b, R)
+        value, w, wr = _data_term(at.point, b, R)
         w2r = w * wr
         a = 0.5 * (len(b) / s - float(wr @ wr))
         a_slope = float(w2r @ wr) - 0.5 * len(b) / s**2
         ek = (self._stacked @ np.concatenate([-2.0 * a * whitened, wr])) * k
-        gradient = z - self._theta2 * (offsets @ ek)
+        ek_slopes = ek * (2.0 * self._kernel.relative_slope(squared))
+        gradient = z + offsets @ ek_slopes
 
         weights = np.concatenate([np.full(n, -2.0 * a), w])
         g = -2.0 * (H @ whitened)
@@ -168,31 +166,32 @@ class FrameMapping:
         v = (0.5 * a_slope) * g - J @ w2r
         vg = v[:, None] * g
         hessian = (slopes * weights) @ slopes.T
-        hessian += (offsets * (self._theta2**2 * ek)) @ offsets.T
+        hessian += (offsets * (ek * (4.0 * self._kernel.relative_curvature(squared)))) @ offsets.T
         hessian += vg
         hessian += vg.T
-        hessian += (1.0 - self._theta2 * float(ek.sum())) * self._identity
+        hessian += (1.0 + float(ek_slopes.sum())) * self._identity
         return value, gradient, hessian
 
-    def stand(self, z: FloatArray) -> Stand:
+    def linearise(self, z: FloatArray) -> LinearisedView:
         """The view at z with its slopes."""
-        view = self.view(z)
-        return Stand(view, (view.offsets * (-self._theta2 * view.k)) @ self._stacked)
+        at = self.point(z)
+        G = at.offsets * (at.k * (2.0 * self._kernel.relative_slope(at.squared)))
+        return LinearisedView(at, G @ self._stacked)
 
-    def view(self, z: FloatArray) -> View:
+    def point(self, z: FloatArray) -> ViewPoint:
         """The view at z."""
-        offsets = z[:, None] - self._Z_T
-        k = np.exp(np.einsum("qn,qn->n", offsets, offsets) * (-0.5 * self._theta2))
-        k *= self._variance
+        kernel, offsets = self._kernel, z[:, None] - self._Z_T
+        squared = np.einsum("qn,qn->n", offsets, offsets)
+        k = kernel.value(squared)
         product = k @ self._stacked
-        whitened, mean = product[: len(k)], product[len(k) :]
-        s = self._noise + max(self._variance - float(whitened @ whitened), 0.0)
-        return View(z, offsets, k, whitened, mean, s)
+        whitened, mean = product[: len(k)], product[len(k) :]  # Eq. (16)
+        s = kernel.noise + max(kernel.variance - float(whitened @ whitened), 0.0)  # Eq. (17)
+        return ViewPoint(z, offsets, squared, k, whitened, mean, s)
 
 
-def _residual(view: View, b: FloatArray, R: FloatArray) -> _Residual:
-    w = 1.0 / (R + view.s)
-    r = view.mean - b
+def _data_term(at: ViewPoint, b: FloatArray, R: FloatArray) -> _DataTerm:
+    w = 1.0 / (R + at.s)
+    r = at.mean - b
     wr = w * r
-    energy = float(wr @ r) + len(b) * math.log(view.s) + float(view.z @ view.z)
-    return _Residual(0.5 * energy, w, wr)
+    energy = float(wr @ r) + len(b) * math.log(at.s) + float(at.z @ at.z)
+    return _DataTerm(0.5 * energy, w, wr)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import torch
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 # Up to so many latent coordinates a dense product is quicker than a sparse one.
 DENSE = 500
@@ -19,7 +17,7 @@ DENSE = 500
 def latent_precision(
     M: sparse.csr_array | None, points: int, latent_dim: int
 ) -> tuple[Tensor, float]:
-    """L = MᵀM + I, and what -log P(Z) = tr(Zᵀ L Z)/2 + constant has beside its product.
+    """L = MᵀM + I and the constant of -log P(Z) = tr(Zᵀ L Z)/2 + constant, Eq. (5).
 
     Parameters
     ----------
@@ -47,30 +45,10 @@ def latent_precision(
 
 
 def product(L: Tensor, Z: Tensor) -> Tensor:
-    """L Z, (N, q), not recorded for differentiation."""
+    """L Z, (N, q): the gradient of tr(Zᵀ L Z)/2."""
     if L.is_sparse or L.device.type != "cpu":
         return L @ Z
     return torch.from_numpy(L.numpy() @ Z.numpy())  # NumPy takes half the time
-
-
-class _HalfSquare(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, Z: Tensor, L: Tensor) -> Tensor:
-        slope = product(L, Z.detach())
-        ctx.save_for_backward(slope)
-        return 0.5 * torch.dot(slope.reshape(-1), Z.reshape(-1))
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor, None]:
-        (slope,) = ctx.saved_tensors
-        return upstream * slope, None
-
-
-def half_square(Z: Tensor, L: Tensor) -> Tensor:
-    """tr(Zᵀ L Z)/2 for a symmetric L: its gradient L Z is at hand, and costs nothing more."""
-    value: Tensor = _HalfSquare.apply(Z, L)  # type: ignore[no-untyped-call]
-    return value
 
 
 def _log_determinant(L: sparse.csc_array) -> float:

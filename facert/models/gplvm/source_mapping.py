@@ -17,23 +17,45 @@ once, and `follow` on one after its predecessor (`facert.models.gplvm.frame_mapp
     ∇F  = J (w r) + a g + z
     ∇²F = J diag(w) Jᵀ + a' g gᵀ - u gᵀ - g uᵀ - 2 a G K⁻¹ Gᵀ + Σ_i e_i ∇²k_i + I,
 
-where u = J (w² r) and e = α (w r) - 2 a K⁻¹ k collects the curvature of the kernel itself.
+where u = J (w² r) and e = α (w r) - 2 a K⁻¹ k, the slope of F in k, collects the curvature of the
+kernel itself, ∇²k_i = 2 k'_i I + 4 k''_i (z - z_i)(z - z_i)ᵀ.
+
+With a torch device the view is there, and thousands of frames go over at once; F with its q
+derivatives comes back, and Newton's steps, in q dimensions, stay here. So do single frames, which
+are soon done.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.models.gp.posterior import PosteriorPoint, Predictor
-from facert.models.gplvm.frame_mapping import DECREMENT, ROUNDING, FrameMapping, Stand
+from facert.models.gp.posterior import PosteriorPoint, Predictor, namespace
+from facert.models.gplvm.frame_mapping import (
+    DECREMENT,
+    ROUNDING,
+    FrameMapping,
+    LinearisedView,
+)
+
+if TYPE_CHECKING:
+    import torch
 
 MAX_ITERATIONS = 200  # in all; most frames need three or four
 SHIFTED_DECREMENT = 1e-9  # a shifted step predicts little, however much is left
 SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
-CHUNK = 128  # frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles
+# Frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles, the device's too.
+CHUNK, DEVICE_CHUNK = 128, 4096
+
+
+def chunks_of(frames: int, view: Predictor) -> Iterator[slice]:
+    """Slices of so many frames that are computed together."""
+    size = CHUNK if view.device is None else DEVICE_CHUNK
+    return (slice(first, first + size) for first in range(0, frames, size))
 
 
 @dataclass(frozen=True)
@@ -93,7 +115,7 @@ class Mapped:
         F(z*).
     converged : array of bool, shape (B,)
         Whether Newton's method met its tolerance.
-    stand : Stand, optional
+    linearised : LinearisedView, optional
         Of a single frame that was followed: where its last step was taken from.
     """
 
@@ -102,7 +124,7 @@ class Mapped:
     hessian: FloatArray
     energy: FloatArray
     converged: BoolArray
-    stand: Stand | None = None
+    linearised: LinearisedView | None = None
 
 
 @dataclass(frozen=True)
@@ -121,33 +143,42 @@ class SourceMapping:
     ----------
     posterior : Predictor
         The source view, X given Z.
+    device : torch.device, optional
+        Where batches are computed; by default here.
     """
 
-    chunk = CHUNK
-
-    def __init__(self, posterior: Predictor) -> None:
+    def __init__(self, posterior: Predictor, device: torch.device | None = None) -> None:
         self.posterior = posterior
+        self._view = posterior if device is None else posterior.on(device)
         # F at every training latent is the search for a start: keep what does not change.
         at = posterior.predict(posterior.Z)
-        self._train_means = np.hstack([0.5 * at.mean**2, -at.mean]).T.copy()
         self._train_variance = float(at.variance.mean())
+        self._train_means = np.hstack([0.5 * at.mean**2, -at.mean]).T.copy()
         self._train_energy = 0.5 * posterior.columns * np.log(at.variance) + 0.5 * np.sum(
             posterior.Z**2, axis=1
+        )
+        self._means_there, self._energy_there = (
+            self._view.there(array) for array in (self._train_means, self._train_energy)
         )
         self._frame = FrameMapping(posterior)
 
     def start(self, observed: Observation) -> FloatArray:
         """The training latent of least energy for each frame, (B, q)."""
-        return np.asarray(self.posterior.Z[self._train_energies(observed).argmin(axis=1)])
+        b, R = self._view.there(observed.mean), self._view.there(observed.variance)
+        energies = self._train_energies(b, R, self._means_there, self._energy_there)
+        return np.asarray(self.posterior.Z[self._view.here(energies.argmin(1))])
 
-    def _train_energies(self, observed: Observation) -> FloatArray:
+    def _train_energies(
+        self, b: FloatArray, R: FloatArray, means: FloatArray, energy: FloatArray
+    ) -> FloatArray:
         """About F at the training latents, (B, N)."""
         # σ_p² varies little between them: its mean serves all.
-        w = 1.0 / (self._train_variance + observed.variance)
-        wb = w * observed.mean
-        of_frame = 0.5 * np.einsum("bd,bd->b", wb, observed.mean)
-        of_both = np.concatenate([w, wb], axis=1) @ self._train_means
-        return np.asarray(of_both + self._train_energy + of_frame[:, None])
+        xp = namespace(b)
+        w = 1.0 / (self._train_variance + R)
+        wb = w * b
+        of_frame: FloatArray = 0.5 * xp.einsum("bd,bd->b", wb, b)
+        of_both: FloatArray = xp.hstack([w, wb]) @ means
+        return of_both + energy + of_frame[:, None]
 
     def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
         """F(z) for B frames, (B,)."""
@@ -168,15 +199,11 @@ class SourceMapping:
         Mapped
             All frames; solved in chunks, so that memory stays bounded.
         """
-        posterior = self.posterior
-        frames = min(self.chunk, len(observed.mean))
-        scratch = np.empty((frames * posterior.Z.shape[1], posterior.stacked.shape[1]))
+        slices = list(chunks_of(len(observed.mean), self._view))
+        scratch = self._scratch(observed[slices[0]])
         chunks = [
             self._newton(observed[rows], [start[rows] for start in starts], scratch)
-            for rows in (
-                slice(first, first + self.chunk)
-                for first in range(0, len(observed.mean), self.chunk)
-            )
+            for rows in slices
         ]
         if len(chunks) == 1:
             return chunks[0]
@@ -186,8 +213,18 @@ class SourceMapping:
         )
         return Mapped(z, x, hessian, energy, converged)
 
+    def _scratch(self, observed: Observation) -> FloatArray | None:
+        """Memory for the largest product of a chunk; a device has its own."""
+        if self._view.device is not None:
+            return None
+        rows = len(observed.mean) * self.posterior.Z.shape[1]
+        return np.empty((rows, self.posterior.stacked.shape[1]))
+
     def follow(
-        self, observed: Observation, previous: FloatArray, stand: Stand | None = None
+        self,
+        observed: Observation,
+        previous: FloatArray,
+        linearised: LinearisedView | None = None,
     ) -> Mapped:
         """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
 
@@ -197,19 +234,21 @@ class SourceMapping:
             One frame.
         previous : array, shape (1, q)
             z of the frame before.
-        stand : Stand, optional
-            `Mapped.stand` of that frame, as good as its z and quicker.
+        linearised : LinearisedView, optional
+            `Mapped.linearised` of that frame, as good as its z and quicker.
         """
         frame, b, R = self._frame, observed.mean[0], observed.variance[0]
-        energies = self._train_energies(observed)[0]
+        (energies,) = self._train_energies(
+            observed.mean, observed.variance, self._train_means, self._train_energy
+        )
         least = energies.argmin()
-        stand = stand or frame.stand(previous[0])
-        found = frame.descend(stand, b, R, float(energies[least]))
+        at = linearised or frame.linearise(previous[0])
+        found = frame.descend(at, b, R, float(energies[least]))
         if found is None:
             nearest = self.posterior.Z[least]
-            if frame.energy(nearest, b, R) < frame.energy(stand.view.z, b, R):
-                stand = frame.stand(nearest)
-            found = frame.descend(stand, b, R)
+            if frame.energy(nearest, b, R) < frame.energy(at.point.z, b, R):
+                at = frame.linearise(nearest)
+            found = frame.descend(at, b, R)
         if found is None:
             return self.solve(observed, previous)
         return Mapped(
@@ -218,11 +257,11 @@ class SourceMapping:
             found.hessian[None],
             np.array([found.energy]),
             np.array([True]),
-            found.stand,
+            found.linearised,
         )
 
     def _newton(
-        self, observed: Observation, starts: list[FloatArray], scratch: FloatArray
+        self, observed: Observation, starts: list[FloatArray], scratch: FloatArray | None
     ) -> Mapped:
         """Newton's method; a shift appears only where a step is rejected, see `_step`."""
         z = self._best_start(observed, starts)
@@ -255,10 +294,12 @@ class SourceMapping:
 
     def _look(self, z: FloatArray, observed: Observation) -> tuple[FloatArray, FloatArray]:
         """F and x* at z (B, q)."""
-        at = self.posterior.predict(z)
-        w = 1.0 / (at.variance[:, None] + observed.variance)
-        r = at.mean - observed.mean
-        return _energy(z, at, w, r), at.mean - at.variance[:, None] * w * r
+        view = self._view
+        z, b, R = (view.there(array) for array in (z, observed.mean, observed.variance))
+        at = view.predict(z)
+        w, r = 1.0 / (at.variance[:, None] + R), at.mean - b
+        x = at.mean - at.variance[:, None] * w * r
+        return view.here(_energy(z, at, w, r)), view.here(x)
 
     def _best_start(self, observed: Observation, starts: list[FloatArray]) -> FloatArray:
         z = self.start(observed)
@@ -272,36 +313,35 @@ class SourceMapping:
         self, z: FloatArray, observed: Observation, scratch: FloatArray | None = None
     ) -> Expansion:
         """F, ∇F and ∇²F at z (B, q), by the formulas at the head of this file."""
-        posterior = self.posterior
-        theta2 = posterior.kernel.inverse_width
-        d_x = posterior.columns
-        at = posterior.predict(z)
-        _, H, J = posterior.jacobians(at, scratch)
+        view = self._view
+        z, b, R = (view.there(array) for array in (z, observed.mean, observed.variance))
+        kernel, d_x, einsum = view.kernel, view.columns, namespace(z).einsum
+        at = view.predict(z)
+        _, H, J = view.jacobians(at, scratch)
 
         s = at.variance
-        w = 1.0 / (s[:, None] + observed.variance)
-        r = at.mean - observed.mean
+        w, r = 1.0 / (s[:, None] + R), at.mean - b
         wr = w * r
         w2r = w * wr
-        a = -0.5 * np.einsum("bd,bd->b", wr, wr) + 0.5 * d_x / s
-        a_slope = np.einsum("bd,bd->b", w2r, wr) - 0.5 * d_x / s**2
-        g = -2.0 * np.einsum("bqn,bn->bq", H, at.whitened)
-        u = np.einsum("bqd,bd->bq", J, w2r)
+        a = -0.5 * einsum("bd,bd->b", wr, wr) + 0.5 * d_x / s
+        a_slope = einsum("bd,bd->b", w2r, wr) - 0.5 * d_x / s**2
+        g = -2.0 * einsum("bqn,bn->bq", H, at.whitened)
+        u = einsum("bqd,bd->bq", J, w2r)
+        gradient = einsum("bqd,bd->bq", J, wr) + a[:, None] * g + z
 
-        gradient = np.einsum("bqd,bd->bq", J, wr) + a[:, None] * g + z
-
-        ek = (wr @ posterior.alpha.T - 2.0 * a[:, None] * posterior.solve(at)) * at.k
+        ek = (wr @ view.alpha.T - 2.0 * a[:, None] * view.solve(at)) * at.k
+        slopes = ek * (2.0 * kernel.relative_slope(at.squared))
+        curvatures = ek * (4.0 * kernel.relative_curvature(at.squared))
         ug = u[:, :, None] * g[:, None, :]
         hessian = (
-            (J * w[:, None, :]) @ J.transpose(0, 2, 1)
+            (J * w[:, None, :]) @ J.mT
             + a_slope[:, None, None] * g[:, :, None] * g[:, None, :]
-            - (ug + ug.transpose(0, 2, 1))
-            - (2.0 * a)[:, None, None] * (H @ H.transpose(0, 2, 1))
-            + theta2**2 * ((at.offsets * ek[:, :, None]).transpose(0, 2, 1) @ at.offsets)
+            - (ug + ug.mT)
+            - (2.0 * a)[:, None, None] * (H @ H.mT)
+            + (at.offsets * curvatures[:, None, :]) @ at.offsets.mT
+            + (1.0 + slopes.sum(1))[:, None, None] * view.identity
         )
-        diagonal = np.arange(z.shape[1])
-        hessian[:, diagonal, diagonal] += (1.0 - theta2 * ek.sum(axis=1))[:, None]
-        return Expansion(_energy(z, at, w, r), gradient, hessian)
+        return Expansion(*(view.here(array) for array in (_energy(z, at, w, r), gradient, hessian)))
 
 
 def _leave_saddles(
@@ -355,9 +395,8 @@ def _step(hessian: FloatArray, gradient: FloatArray, shift: FloatArray) -> Float
 
 
 def _energy(z: FloatArray, at: PosteriorPoint, w: FloatArray, r: FloatArray) -> FloatArray:
-    energy: FloatArray = 0.5 * (
-        np.einsum("bd,bd,bd->b", w, r, r)
-        + r.shape[1] * np.log(at.variance)
-        + np.einsum("bq,bq->b", z, z)
-    )
+    """F of B frames, (B,)."""
+    xp = namespace(z)
+    squares = xp.einsum("bd,bd,bd->b", w, r, r) + xp.einsum("bq,bq->b", z, z)
+    energy: FloatArray = 0.5 * (squares + r.shape[1] * xp.log(at.variance))
     return energy

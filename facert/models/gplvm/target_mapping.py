@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.models.gp.posterior import Predictor
-from facert.models.gplvm.source_mapping import CHUNK, Mapped
+from facert.models.gp.posterior import Predictor, namespace
+from facert.models.gplvm.source_mapping import Mapped, chunks_of
 
 
 def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, FloatArray]:
@@ -19,7 +19,7 @@ def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, Flo
     Parameters
     ----------
     posterior : Predictor
-        The target view, Y given Z.
+        The target view, Y given Z, perhaps on a device.
     mapped : Mapped
         B frames in latent space.
 
@@ -29,12 +29,12 @@ def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, Flo
         Normalised units.
     """
     means, stds = [], []
-    for first in range(0, len(mapped.z), CHUNK):
-        rows = slice(first, first + CHUNK)
-        at = posterior.predict(mapped.z[rows])
+    for rows in chunks_of(len(mapped.z), posterior):
+        z, hessian = (posterior.there(array[rows]) for array in (mapped.z, mapped.hessian))
+        at, xp = posterior.predict(z), namespace(z)
         J = posterior.mean_jacobian(at)
-        spread = np.einsum("bqd,bqd->bd", J, np.linalg.solve(mapped.hessian[rows], J))
-        means.append(at.mean)
+        spread = xp.einsum("bqd,bqd->bd", J, xp.linalg.solve(hessian, J))
+        means.append(posterior.here(at.mean))  # Eq. (18)
         # Where Newton's method gave up the Hessian may be indefinite.
-        stds.append(np.sqrt(at.variance[:, None] + np.maximum(spread, 0.0)))
+        stds.append(posterior.here(xp.sqrt(at.variance[:, None] + spread.clip(0.0))))
     return np.concatenate(means), np.concatenate(stds)

@@ -2,13 +2,42 @@ import pytest
 import torch
 
 from facert.errors import NumericalError
-from facert.models.gp.likelihood import compact_factor, negative_log_likelihood
-from facert.models.gp.sparse import APPROXIMATIONS, sparse_negative_log_likelihood
+from facert.models.closed_form import closed_form
+from facert.models.gp import likelihood, sparse
+from facert.models.gp.likelihood import compact_factor
+from facert.models.gp.sparse import APPROXIMATIONS
+from facert.models.kernels import KERNELS, SquaredExponential
 
 COLUMNS = 5
 FLOOR = 0.02
 
 every_approximation = pytest.mark.parametrize("approximation", APPROXIMATIONS)
+every_kernel = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+
+
+def negative_log_likelihood(Z, log_kernel, X, columns, floor, kernel=SquaredExponential):
+    """As a function that torch can differentiate."""
+    return closed_form(
+        lambda *v: likelihood.negative_log_likelihood(*v, X, columns, floor, kernel), Z, log_kernel
+    )
+
+
+def sparse_negative_log_likelihood(
+    Z,
+    U,
+    log_kernel,
+    F,
+    columns,
+    floor=0.0,
+    approximation="vfe",
+    weights=None,
+    kernel=SquaredExponential,
+):
+    """The same through inducing positions U."""
+    rest = F, columns, floor, kernel, approximation, weights
+    return closed_form(
+        lambda *v: sparse.sparse_negative_log_likelihood(*v, *rest), Z, U, log_kernel
+    )
 
 
 def normal(*shape, seed=0):
@@ -41,12 +70,17 @@ def weights():
     return torch.tensor([2.0] * 6 + [1.0] * 12 + [0.3] * 6, dtype=torch.float64)
 
 
+@every_kernel
 @every_approximation
-def test_where_every_row_is_inducing_value_and_gradient_are_exact(approximation, Z, log_kernel, X):
+def test_where_every_row_is_inducing_value_and_gradient_are_exact(
+    approximation, Z, log_kernel, X, kernel
+):
     """The latents' gradient is then shared between rows and inducing positions."""
     U = Z.detach().clone().requires_grad_()
-    sparse = sparse_negative_log_likelihood(Z, U, log_kernel, X, COLUMNS, FLOOR, approximation)
-    exact = negative_log_likelihood(Z, log_kernel, X, COLUMNS, FLOOR)
+    sparse = sparse_negative_log_likelihood(
+        Z, U, log_kernel, X, COLUMNS, FLOOR, approximation, kernel=kernel
+    )
+    exact = negative_log_likelihood(Z, log_kernel, X, COLUMNS, FLOOR, kernel)
     torch.testing.assert_close(sparse, exact, rtol=1e-8, atol=0.0)
     d_Z, d_U, d_kernel = torch.autograd.grad(sparse, (Z, U, log_kernel))
     exact_Z, exact_kernel = torch.autograd.grad(exact, (Z, log_kernel))
@@ -54,12 +88,14 @@ def test_where_every_row_is_inducing_value_and_gradient_are_exact(approximation,
     torch.testing.assert_close(d_kernel, exact_kernel, rtol=1e-6, atol=1e-5)
 
 
+@every_kernel
 @every_approximation
 def test_the_closed_form_gradient_is_that_of_finite_differences(
-    approximation, Z, U, log_kernel, X, weights
+    approximation, Z, U, log_kernel, X, weights, kernel
 ):
     def value(*variables):
-        return sparse_negative_log_likelihood(*variables, X, COLUMNS, FLOOR, approximation, weights)
+        rest = X, COLUMNS, FLOOR, approximation, weights, kernel
+        return sparse_negative_log_likelihood(*variables, *rest)
 
     assert torch.autograd.gradcheck(value, (Z, U, log_kernel))
 

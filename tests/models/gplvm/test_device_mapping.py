@@ -5,12 +5,7 @@ import pytest
 import torch
 
 from facert.models.gp.posterior import Posterior
-from facert.models.gplvm import device_mapping
-from facert.models.gplvm.device_mapping import (
-    DevicePredictor,
-    DeviceSourceMapping,
-    map_to_target_on,
-)
+from facert.models.gplvm import source_mapping
 from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.models.gplvm.target_mapping import map_to_target
 from facert.models.kernels import SquaredExponential
@@ -51,7 +46,7 @@ def device(request):
 
 def test_the_objective_and_its_derivatives_are_the_same(source, observed, device):
     z = np.random.default_rng(3).normal(size=(40, 3))
-    plain, there = SourceMapping(source), DeviceSourceMapping(source, device)
+    plain, there = SourceMapping(source), SourceMapping(source, device)
     here, away = plain._expand(z, observed), there._expand(z, observed)
     for name in ("energy", "gradient", "hessian"):
         np.testing.assert_allclose(getattr(away, name), getattr(here, name), rtol=1e-9, atol=1e-9)
@@ -64,9 +59,9 @@ def test_the_objective_and_its_derivatives_are_the_same(source, observed, device
 def test_frames_end_at_the_same_optimum_however_they_are_cut(
     source, observed, device, chunk, monkeypatch
 ):
-    monkeypatch.setattr(DeviceSourceMapping, "chunk", chunk)
+    monkeypatch.setattr(source_mapping, "DEVICE_CHUNK", chunk)
     plain = SourceMapping(source).solve(observed)
-    there = DeviceSourceMapping(source, device).solve(observed)
+    there = SourceMapping(source, device).solve(observed)
     assert there.converged.all()
     for name in ("z", "x", "energy"):
         ours, theirs = getattr(there, name), getattr(plain, name)
@@ -75,9 +70,9 @@ def test_frames_end_at_the_same_optimum_however_they_are_cut(
 
 @pytest.mark.parametrize("chunk", [7, 4096])
 def test_poses_and_their_spread_are_the_same(source, observed, device, chunk, monkeypatch):
-    monkeypatch.setattr(device_mapping, "CHUNK", chunk)
+    monkeypatch.setattr(source_mapping, "DEVICE_CHUNK", chunk)
     target = make_view(5, 0.05, 4)
     mapped = SourceMapping(source).solve(observed)
-    there = map_to_target_on(DevicePredictor(target, device), mapped)
+    there = map_to_target(target.on(device), mapped)
     for ours, theirs in zip(there, map_to_target(target, mapped), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)

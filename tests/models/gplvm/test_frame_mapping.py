@@ -35,7 +35,7 @@ def test_energy_gradient_and_hessian_are_those_of_the_batch(mapping, missing):
     batch = mapping._expand(Z, observed)
     for row, z in enumerate(Z):
         of_frame = observed.mean[row], observed.variance[row]
-        energy, gradient, hessian = mapping._frame.expand(mapping._frame.stand(z), *of_frame)
+        energy, gradient, hessian = mapping._frame.expand(mapping._frame.linearise(z), *of_frame)
         assert energy == mapping._frame.energy(z, *of_frame)
         assert energy == pytest.approx(batch.energy[row], rel=1e-12)
         np.testing.assert_allclose(gradient, batch.gradient[row], rtol=1e-9, atol=1e-9)
@@ -83,13 +83,13 @@ def test_descent_is_refused_above_the_energy_given_and_on_a_saddle(mapping):
     (z,) = mapping.solve(observed).z
     frame = mapping._frame
     least = frame.energy(z, b, R)
-    assert frame.descend(frame.stand(z), b, R, least + 1.0) is not None
-    assert frame.descend(frame.stand(z), b, R, least - 1.0) is None
+    assert frame.descend(frame.linearise(z), b, R, least + 1.0) is not None
+    assert frame.descend(frame.linearise(z), b, R, least - 1.0) is None
     starts = np.random.default_rng(4).normal(scale=2.0, size=(200, LATENT))
-    stands = [frame.stand(start) for start in starts]
-    curved = [s for s in stands if np.linalg.eigvalsh(frame.expand(s, b, R)[2])[0] < 0]
+    points = [frame.linearise(start) for start in starts]
+    curved = [s for s in points if np.linalg.eigvalsh(frame.expand(s, b, R)[2])[0] < 0]
     assert curved
-    assert all(frame.descend(stand, b, R) is None for stand in curved)
+    assert all(frame.descend(at, b, R) is None for at in curved)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3])
@@ -98,7 +98,7 @@ def test_to_begin_where_the_frame_before_stood_is_as_good_as_to_begin_at_its_z(m
     mapped = mapping.solve(observed[:1])
     for row in range(1, 40):
         plain = mapping.follow(observed[row : row + 1], mapped.z)
-        mapped = mapping.follow(observed[row : row + 1], mapped.z, mapped.stand)
+        mapped = mapping.follow(observed[row : row + 1], mapped.z, mapped.linearised)
         np.testing.assert_allclose(mapped.z, plain.z, atol=1e-4)
         np.testing.assert_allclose(mapped.x, plain.x, atol=1e-4)
         assert mapped.energy[0] == pytest.approx(plain.energy[0], abs=1e-6)

@@ -4,7 +4,7 @@ import torch
 from scipy.stats import multivariate_normal
 
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
 
 LABELLED, SOURCE, TARGET, LATENT = 4, 3, 2, 2
 FLOOR_X, FLOOR_Y = 0.01, 0.05
@@ -21,14 +21,20 @@ def Z():
     return np.random.default_rng(1).normal(size=(LABELLED + SOURCE + TARGET, LATENT))
 
 
-def make_module(X, Y, Z, neighbours=3):
-    M = constraint_matrix(X, Y, LABELLED, neighbours)
-    return SharedGPLVM(X, Y, LABELLED, M, Z, FLOOR_X, FLOOR_Y)
+def make_module(X, Y, Z, constrained=True):
+    M = constraint_matrix(X, Y, LABELLED, 3) if constrained else None
+    rows = view_rows(LABELLED, len(X) - LABELLED, len(Y) - LABELLED)
+    views = map(GaussianView, (X, Y), rows, (FLOOR_X, FLOOR_Y))
+    return SharedGPLVM(*views, M, Z)
+
+
+def view_energy(module, view):
+    return view.value_and_gradient(module.Z.detach()[view.rows])[0].item()
 
 
 def test_the_parameters_are_the_latent_coordinates_and_both_log_kernels(views, Z):
     shapes = {name: tuple(p.shape) for name, p in make_module(*views, Z).named_parameters()}
-    assert shapes == {"Z": (9, LATENT), "log_kernel_x": (3,), "log_kernel_y": (3,)}
+    assert shapes == {"Z": (9, LATENT), "source.log_kernel": (3,), "target.log_kernel": (3,)}
     assert all(p.dtype == torch.float64 for p in make_module(*views, Z).parameters())
 
 
@@ -44,9 +50,11 @@ def test_the_energy_is_that_of_equations_1_2_and_5(views, Z):
 
     M = constraint_matrix(X, Y, LABELLED, 3).toarray()
     prior = multivariate_normal(cov=np.linalg.inv(M.T @ M + np.eye(len(Z))))
-    assert module.source_energy().item() == pytest.approx(minus_log_likelihood(X, Z_x, FLOOR_X))
-    assert module.target_energy().item() == pytest.approx(minus_log_likelihood(Y, Z_y, FLOOR_Y))
-    assert module.prior_energy().item() == pytest.approx(-prior.logpdf(Z.T).sum())
+    of_source = view_energy(module, module.source)
+    of_target = view_energy(module, module.target)
+    assert of_source == pytest.approx(minus_log_likelihood(X, Z_x, FLOOR_X))
+    assert of_target == pytest.approx(minus_log_likelihood(Y, Z_y, FLOOR_Y))
+    assert module().item() - of_source - of_target == pytest.approx(-prior.logpdf(Z.T).sum())
     assert module().item() == pytest.approx(
         minus_log_likelihood(X, Z_x, FLOOR_X)
         + minus_log_likelihood(Y, Z_y, FLOOR_Y)
@@ -55,8 +63,9 @@ def test_the_energy_is_that_of_equations_1_2_and_5(views, Z):
 
 
 def test_without_constraints_the_prior_is_standard_normal(views, Z):
-    module = SharedGPLVM(*views, LABELLED, None, Z, FLOOR_X, FLOOR_Y)
-    assert module.prior_energy().item() == pytest.approx(
+    module = make_module(*views, Z, constrained=False)
+    of_views = sum(view_energy(module, view) for view in (module.source, module.target))
+    assert module().item() - of_views == pytest.approx(
         -multivariate_normal(cov=np.eye(LATENT)).logpdf(Z).sum()
     )
 
@@ -72,14 +81,14 @@ def test_the_order_of_the_unlabelled_rows_does_not_matter(views, Z):
 
 def test_each_view_sees_its_own_rows_and_the_labelled_ones(views, Z):
     module = make_module(*views, Z)
-    np.testing.assert_array_equal(module.latents_x, Z[:7])
-    np.testing.assert_array_equal(module.latents_y, Z[[0, 1, 2, 3, 7, 8]])
+    np.testing.assert_array_equal(module.latents(module.source), Z[:7])
+    np.testing.assert_array_equal(module.latents(module.target), Z[[0, 1, 2, 3, 7, 8]])
 
 
 def test_the_kernels_begin_at_the_papers_parameters_above_the_floors(views, Z):
     module = make_module(*views, Z)
-    for kernel, floor in ((module.kernel_x, FLOOR_X), (module.kernel_y, FLOOR_Y)):
-        assert kernel.theta == pytest.approx((1.0, 1.0, 1 / (1 / 100 + floor)))
+    for view, floor in ((module.source, FLOOR_X), (module.target, FLOOR_Y)):
+        assert view.kernel.theta == pytest.approx((1.0, 1.0, 1 / (1 / 100 + floor)))
 
 
 def test_any_order_in_memory_will_do_for_the_initial_coordinates(views, Z):

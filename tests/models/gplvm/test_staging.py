@@ -3,7 +3,7 @@ import pytest
 
 from facert.models.gplvm.alignment import align
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
 from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, Start, spread
 from facert.models.gplvm.training import train
 from facert.models.optim.lbfgs import LBFGS
@@ -51,7 +51,9 @@ def trained(views):
     core = Core.of(X, Y, LABELLED)
     X, Y = X[core.rows_x], Y[core.rows_y]
     M = constraint_matrix(X, Y, LABELLED, 6)
-    module = SharedGPLVM(X, Y, LABELLED, M, align(M, 2), 1e-3, 1e-3)
+    rows = view_rows(LABELLED, len(X) - LABELLED, len(Y) - LABELLED)
+    views = map(GaussianView, (X, Y), rows, (1e-3, 1e-3))
+    module = SharedGPLVM(*views, M, align(M, 2))
     train(
         module,
         LBFGS(),
@@ -68,12 +70,12 @@ def test_rows_of_the_core_stay_and_the_others_are_placed_where_their_view_explai
     views, trained
 ):
     (X, Y), (core, module) = views, trained
-    posteriors = module.source_posterior(X[core.rows_x]), module.target_posterior(Y[core.rows_y])
+    posteriors = module.posteriors()
     Z = Start.at(*posteriors).latents(X, Y, LABELLED)
     assert Z.shape == (LABELLED + 360, 2)
-    np.testing.assert_array_equal(Z[core.rows_x], module.latents_x)
+    np.testing.assert_array_equal(Z[core.rows_x], module.latents(module.source))
     Z_y = np.vstack([Z[:LABELLED], Z[len(X) :]])
-    np.testing.assert_array_equal(Z_y[core.rows_y], module.latents_y)
+    np.testing.assert_array_equal(Z_y[core.rows_y], module.latents(module.target))
     for Z_view, view, posterior in zip((Z[: len(X)], Z_y), (X, Y), posteriors, strict=True):
         error = np.abs(posterior.predict(Z_view).mean - view)
         assert error.mean() < 0.1 * view.std()

@@ -6,7 +6,7 @@ import torch
 
 from facert.models.gplvm.alignment import align
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
 from facert.models.gplvm.training import train
 from facert.models.optim.base import State
 from facert.models.optim.lbfgs import LBFGS
@@ -59,7 +59,8 @@ def make_module(labelled=8, alone=10):
     Y = np.sin(np.r_[latent[:labelled], latent[labelled + alone :]] @ rng.normal(size=(2, 10)))
     X, Y = (U + 0.3 * rng.normal(size=U.shape) for U in (X, Y))
     M = constraint_matrix(X, Y, labelled, 5)
-    return SharedGPLVM(X, Y, labelled, M, align(M, 2), 1e-2, 5e-2)
+    rows = view_rows(labelled, len(X) - labelled, len(Y) - labelled)
+    return SharedGPLVM(*map(GaussianView, (X, Y), rows, (1e-2, 5e-2)), M, align(M, 2))
 
 
 def test_the_module_is_left_at_the_value_that_is_told(module, optimiser):

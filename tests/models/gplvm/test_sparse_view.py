@@ -3,13 +3,8 @@ import pytest
 import torch
 
 from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import SharedGPLVM
-from facert.models.gplvm.sparse_module import (
-    MOST_COUNTED,
-    SparseSharedGPLVM,
-    inducing_rows,
-    row_weights,
-)
+from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.sparse_view import MOST_COUNTED, SparseView, inducing_rows, row_weights
 
 LABELLED, SOURCE, TARGET, LATENT = 5, 12, 8, 2
 FLOORS = 0.01, 0.05
@@ -28,9 +23,11 @@ def Z():
 
 def both(X, Y, Z, inducing, **options):
     M = constraint_matrix(X, Y, LABELLED, 3)
+    given = list(zip((X, Y), view_rows(LABELLED, SOURCE, TARGET), FLOORS, strict=True))
+    options |= {"labelled": LABELLED, "inducing": inducing}
     return (
-        SharedGPLVM(X, Y, LABELLED, M, Z, *FLOORS),
-        SparseSharedGPLVM(X, Y, LABELLED, M, Z, *FLOORS, inducing=inducing, **options),
+        SharedGPLVM(*(GaussianView(*view) for view in given), M, Z),
+        SharedGPLVM(*(SparseView(*view, latents=Z[view[1]], **options) for view in given), M, Z),
     )
 
 
@@ -41,31 +38,29 @@ def test_where_all_rows_are_inducing_energy_and_posteriors_are_those_of_the_exac
     exact, sparse = both(*views, Z, 50, approximation=approximation)
     torch.testing.assert_close(sparse(), exact(), rtol=1e-8, atol=0.0)
     z = np.random.default_rng(2).normal(size=(4, LATENT))
-    for one, other, view in (
-        (exact.source_posterior, sparse.source_posterior, views[0]),
-        (exact.target_posterior, sparse.target_posterior, views[1]),
-    ):
-        np.testing.assert_allclose(
-            other(view).predict(z).mean, one(view).predict(z).mean, atol=1e-6
-        )
+    for one, other in zip(exact.posteriors(), sparse.posteriors(), strict=True):
+        np.testing.assert_allclose(other.predict(z).mean, one.predict(z).mean, atol=1e-6)
 
 
 def test_inducing_latents_are_trained_with_the_rest(views, Z):
     _, sparse = both(*views, Z, 7)
     shapes = {name: tuple(p.shape) for name, p in sparse.named_parameters()}
-    assert shapes["inducing_x"] == shapes["inducing_y"] == (7, LATENT)
+    assert shapes["source.inducing"] == shapes["target.inducing"] == (7, LATENT)
     sparse().backward()
     assert all(p.grad.abs().max() > 0 for p in sparse.parameters())
+
+
+def gradient_of(view, Z):
+    gradient = torch.zeros_like(Z)
+    gradient[view.rows] = view.value_and_gradient(Z[view.rows])[1]
+    return gradient
 
 
 def test_each_view_has_its_own_rows_and_the_labelled_ones(views, Z):
     """A row of one view does not pull at those of the other but by the prior."""
     _, sparse = both(*views, Z, 7)
     source, target = slice(LABELLED, LABELLED + SOURCE), slice(LABELLED + SOURCE, None)
-    by_source, by_target = (
-        torch.autograd.grad(energy, sparse.Z)[0]
-        for energy in (sparse.source_energy(), sparse.target_energy())
-    )
+    by_source, by_target = (gradient_of(view, sparse.Z.detach()) for view in sparse.children())
     assert (by_source[target] == 0).all()
     assert (by_target[source] == 0).all()
     assert (by_source[:LABELLED] != 0).all()
@@ -75,11 +70,11 @@ def test_each_view_has_its_own_rows_and_the_labelled_ones(views, Z):
 def test_it_takes_over_the_kernels_of_a_trained_model(views, Z):
     exact, sparse = both(*views, Z, 7)
     with torch.no_grad():
-        exact.log_kernel_x.add_(0.3)
-        exact.log_kernel_y.sub_(0.2)
-    sparse.begin_with(exact.kernel_x, exact.kernel_y)
-    assert sparse.kernel_x.theta == pytest.approx(exact.kernel_x.theta, rel=1e-12)
-    assert sparse.kernel_y.theta == pytest.approx(exact.kernel_y.theta, rel=1e-12)
+        exact.source.log_kernel.add_(0.3)
+        exact.target.log_kernel.sub_(0.2)
+    for view, trained in zip(sparse.children(), exact.children(), strict=True):
+        view.begin_with(trained.kernel)
+        assert view.kernel.theta == pytest.approx(trained.kernel.theta, rel=1e-12)
 
 
 def test_unlabelled_rows_weigh_as_much_as_so_many_at_most():

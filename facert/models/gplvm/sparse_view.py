@@ -1,0 +1,104 @@
+"""A view of the shared model that sees its rows through inducing latents, for large sets.
+
+Eq. (1) or (2) is replaced by the bound of `facert.models.gp.sparse`: an evaluation costs in
+proportion to the rows of a view, and mapping depends on its inducing latents alone. They are
+trained with the rest.
+
+Where unlabelled rows outnumber the labels many times, what the labels show of both views together
+is lost beside what each view shows alone. The unlabelled rows of a view therefore weigh no more
+than `MOST_COUNTED` rows, all together, however many there are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from facert.data.arrays import FloatArray, IntArray
+from facert.models.gp.posterior import Predictor
+from facert.models.gp.sparse import ApproximationName, sparse_negative_log_likelihood
+from facert.models.gp.sparse_posterior import sparse_posterior
+from facert.models.gplvm.module import GaussianView
+from facert.models.gplvm.staging import spread
+from facert.models.kernels import Kernel, SquaredExponential
+
+MOST_COUNTED = 100.0
+
+
+class SparseView(GaussianView):
+    """`GaussianView` with the further trainable tensor ``inducing``.
+
+    Parameters
+    ----------
+    observations, rows, noise_floor, kernel
+        As of `GaussianView`.
+    latents : array, shape (n, q)
+        Initial latent coordinates of its rows.
+    labelled : int
+        How many of them, in front, are labelled.
+    inducing : int
+        Inducing latents; all rows where there are fewer. They begin at labelled rows and others
+        spread over the view.
+    approximation : {"vfe", "fitc"}
+        See `facert.models.gp.sparse`.
+    """
+
+    weights: Tensor
+
+    def __init__(
+        self,
+        observations: FloatArray,
+        rows: IntArray,
+        noise_floor: float,
+        kernel: type[Kernel] = SquaredExponential,
+        *,
+        latents: FloatArray,
+        labelled: int,
+        inducing: int,
+        approximation: ApproximationName = "vfe",
+    ) -> None:
+        super().__init__(observations, rows, noise_floor, kernel)
+        self.approximation = approximation
+        self.register_buffer("weights", row_weights(len(rows), labelled))
+        begin = inducing_rows(len(rows), labelled, inducing)
+        self.inducing = nn.Parameter(torch.from_numpy(latents[begin]))
+
+    def value_and_gradient(self, Z: Tensor) -> tuple[Tensor, ...]:
+        """The bound in place of the likelihood; see `GaussianView`."""
+        value, dZ, dU, d_log_kernel = sparse_negative_log_likelihood(
+            Z,
+            self.inducing.detach(),
+            self.log_kernel.detach(),
+            self.factor,
+            self.columns,
+            self.noise_floor,
+            self.kernel_type,
+            self.approximation,
+            self.weights,
+        )
+        return value, dZ, d_log_kernel, dU
+
+    def posterior(self, latents: FloatArray) -> Predictor:
+        """The process given its observations, seen from the inducing latents."""
+        return sparse_posterior(
+            self.inducing.detach().cpu().numpy(),
+            latents,
+            self.observations,
+            self.kernel,
+            self.approximation,
+            self.weights.cpu().numpy(),
+        )
+
+
+def row_weights(rows: int, labelled: int) -> Tensor:
+    """1 for labelled rows, and for the others what makes them count as `MOST_COUNTED` at most."""
+    weights = torch.ones(rows, dtype=torch.float64)
+    weights[labelled:] = min(1.0, MOST_COUNTED / max(rows - labelled, 1))
+    return weights
+
+
+def inducing_rows(rows: int, labelled: int, count: int) -> IntArray:
+    """The rows at which inducing latents begin: labelled ones, and others evenly after them."""
+    labels = spread(0, labelled, count)
+    return np.concatenate([labels, spread(labelled, rows, count - len(labels))])
