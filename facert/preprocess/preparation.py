@@ -23,6 +23,7 @@ from facert.preprocess.motion.estimate import (
 )
 from facert.preprocess.motion.noise import capture_noise
 from facert.preprocess.neutral import at_rest, most_neutral
+from facert.preprocess.source_layout import SourceLayout
 from facert.preprocess.training_set import MIN_OBSERVED, TrainingSet, choose_training_set
 from facert.settings import Settings
 
@@ -57,14 +58,6 @@ class Prepared:
     units: Normalisation
     estimate: Estimate | None
 
-    @property
-    def step(self) -> float:
-        """How far frames move on from one to the next, normalised units: σ_t, Eq. (14)."""
-        if self.estimate is not None:
-            return max(self.estimate.sigma_t / self.units.scale, LEAST_NOISE)
-        X = self.measured.matrix
-        return max(largest_step(X, capture_noise(X)) / self.units.scale, LEAST_NOISE)
-
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
@@ -75,9 +68,15 @@ class TrainingData:
     prepared : Prepared
     names : tuple of str
         Of the markers or weights that the take was recorded with, seen or not.
+    layout : SourceLayout
+        Of the prepared take.
     controls : Controls
     chosen : TrainingSet
         Frames and poses that a method is given.
+    poses : array, shape (l + n, P)
+        All these poses, those of the labelled frames first.
+    step : float
+        How far frames move on from one to the next, normalised units: σ_t, Eq. (14).
     complete : array, shape (n, d_x)
         Frames that show everything, to estimate the noise from.
     neutral : array, shape (d_x,)
@@ -92,8 +91,11 @@ class TrainingData:
 
     prepared: Prepared
     names: tuple[str, ...]
+    layout: SourceLayout
     controls: Controls
     chosen: TrainingSet
+    poses: FloatArray
+    step: float
     complete: FloatArray
     neutral: FloatArray
     bounds: FloatArray | None
@@ -114,15 +116,19 @@ def training_data(take: Take, settings: Settings) -> TrainingData:
     prepared = prepare(take, settings)
     clean = prepared.take
     chosen = choose_training_set(clean, settings)
+    poses = np.vstack([chosen.Y_labelled, chosen.Y_unlabelled])
     return TrainingData(
         prepared,
         take.source.names,
+        SourceLayout(clean.source.kind, clean.source.names),
         take.controls,
         chosen,
+        poses,
+        _step(prepared),
         _complete_frames(clean.source, chosen),
         _neutral(clean, chosen, settings),
         pose_bounds(clean, chosen.Y_labelled, settings.limits),
-        Normalisation.of(chosen.poses, "/target/params"),
+        Normalisation.of(poses, "/target/params"),
         keep(chosen.Y_labelled, clean.animation, settings.seed),
     )
 
@@ -171,6 +177,16 @@ def _warn_of_zeros(source: Source) -> None:
     if zeros:
         positions = plural(zeros, "marker position")
         log.warning("%s exactly at (0, 0, 0): lost ones should be NaN", positions)
+
+
+def _step(prepared: Prepared) -> float:
+    """How far frames move on from one to the next, normalised units."""
+    if prepared.estimate is None:
+        X = prepared.measured.matrix
+        step = largest_step(X, capture_noise(X))
+    else:
+        step = prepared.estimate.sigma_t
+    return max(step / prepared.units.scale, LEAST_NOISE)
 
 
 def _complete_frames(source: Source, chosen: TrainingSet) -> FloatArray:

@@ -44,11 +44,6 @@ class TrainingSet:
     Y_unlabelled: FloatArray
     frames: IntArray
 
-    @property
-    def poses(self) -> FloatArray:
-        """All poses, those of the labelled frames first, (l + n, d_y)."""
-        return np.vstack([self.Y_labelled, self.Y_unlabelled])
-
 
 def choose_training_set(take: Take, settings: Settings) -> TrainingSet:
     """Draw labelled and unlabelled data as the settings ask, by their seed.

@@ -39,7 +39,7 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> RegionL
     InputError
         When nothing moves in a region.
     """
-    source, poses = data.prepared.measured, data.chosen.poses
+    source, poses = data.prepared.measured, data.poses
     columns = np.array([_columns(region, source) for region in regions.parts])
     members = np.array([np.isin(data.controls.names, part.controls) for part in regions.parts])
     units, noise, trust = [], [], []
@@ -65,7 +65,7 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> RegionL
 def _errors(data: TrainingData, seen: BoolArray) -> FloatArray:
     """The error of predicting each control from some columns, (P,); above 0."""
     frames, labelled = (X.compress(seen, axis=1) for X in (data.complete, data.chosen.X_labelled))
-    found = label_errors(frames, labelled, data.chosen.poses[: len(labelled)])
+    found = label_errors(frames, labelled, data.poses[: len(labelled)])
     return np.maximum(found, FAULTLESS)
 
 

@@ -83,7 +83,7 @@ def learn(
         one of them.
     """
     regions = _resolved(settings.regions, data)
-    step = data.prepared.step if settings.sigma_t is None else settings.sigma_t
+    step = data.step if settings.sigma_t is None else settings.sigma_t
     given = replace(settings, regions=regions, sigma_t=step)
     source, target, chosen = data.prepared.units, data.target_units, data.chosen
     layout = None if regions is None else lay_out(regions, data, given)

@@ -15,7 +15,6 @@ from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.motion.estimate import Estimate
 from facert.preprocess.preparation import TrainingData, training_data
-from facert.preprocess.source_layout import SourceLayout
 from facert.regions.learning import Learned, Start, learn
 from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
@@ -60,7 +59,7 @@ def train(
     prepared, chosen = data.prepared, data.chosen
     return Retargeter(
         method=learned.method,
-        layout=SourceLayout(prepared.take.source.kind, prepared.take.source.names),
+        layout=data.layout,
         units=take.units,
         controls=data.controls,
         bounds=data.bounds,
@@ -100,11 +99,10 @@ def check_poses(take: Take) -> None:
 
 def _start(start: Retargeter, data: TrainingData) -> Start:
     """A trained model to begin at, and what keeps it from being one for this take."""
-    source = data.prepared.take.source
     forms = {
-        "kind of source": (source.kind, start.layout.kind),
+        "kind of source": (data.layout.kind, start.layout.kind),
         "unit of markers": (data.prepared.take.units, start.units),
-        "markers or weights": (source.names, start.layout.names),
+        "markers or weights": (data.layout.names, start.layout.names),
         "controls": (data.controls.names, start.controls.names),
     }
     difference = next((what for what, (here, there) in forms.items() if here != there), None)

@@ -44,6 +44,8 @@ class Estimate:
         What was not observed.
     sigma : float
         Standard deviation of the capture noise.
+    sigma_t : float
+        How far the column that moves most goes from frame to frame, RMS.
     motion : Motion
         How the observed columns move, in `units`.
     units : Normalisation
@@ -56,6 +58,7 @@ class Estimate:
     spread: FloatArray
     hidden: BoolArray
     sigma: float
+    sigma_t: float
     motion: Motion
     units: Normalisation
     given: FloatArray
@@ -78,11 +81,6 @@ class Estimate:
         """Noise and motion, for people."""
         unit = f" {unit}" if unit else ""
         return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} a frame"
-
-    @property
-    def sigma_t(self) -> float:
-        """How far the column that moves most goes from frame to frame, RMS."""
-        return largest_step(self.frames)
 
 
 @remembered
@@ -117,7 +115,8 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Est
     frames, spread = np.full(X.shape, np.nan), np.full(X.shape, np.nan)
     frames[:, ever] = units.undo(mean[places])
     spread[:, ever] = units.scale * np.sqrt(variance[places])
-    return Estimate(frames, spread, np.isnan(X), sigma, motion, units, given)
+    step = largest_step(frames)
+    return Estimate(frames, spread, np.isnan(X), sigma, step, motion, units, given)
 
 
 def estimate_if_it_moves(
