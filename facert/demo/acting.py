@@ -46,20 +46,13 @@ FEELINGS: dict[str, Pose] = {
 
 @dataclass(frozen=True, eq=False)
 class Gestures:
-    """Smooth moves: up within `rise` seconds, held, and back.
-
-    Attributes
-    ----------
-    middle, rise, hold : arrays, shape (G,)
-        Seconds; `hold` is the time at full strength.
-    targets : array, shape (G, 26)
-        `ACTIVATIONS` at full strength.
-    """
+    """Smooth moves: up within `rise` seconds, held for `hold` at full strength, and back, (G,)."""
 
     middle: FloatArray
     rise: FloatArray
     hold: FloatArray
     targets: FloatArray
+    """`ACTIVATIONS` at full strength, (G, 26)."""
 
     def at(self, time: FloatArray) -> FloatArray:
         """Sum of all gestures (T, 26) at times (T,)."""

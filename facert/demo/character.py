@@ -21,25 +21,17 @@ EASE = 2.0
 
 @dataclass(frozen=True)
 class Control:
-    """One slider of the rig.
-
-    Parameters
-    ----------
-    name : str
-    shape : mapping
-        What it does at 1, as a blend of the activations on the character's own mesh.
-    low, high : float
-        Limits.
-    power : float
-        Easing: the effect of a slider at c is c ** (1 / power), fast at first and then slow, on
-        both sides of zero: a hint of a smile needs little, the last of it much.
-    """
+    """One slider of the rig."""
 
     name: str
     shape: Mapping[str, float]
+    """What it does at 1, as a blend of the activations on the character's own mesh."""
     low: float = 0.0
     high: float = 1.0
+    """Limits of the slider are `low` and `high`."""
     power: float = 1.0
+    """Easing: the effect of a slider at c is c ** (1 / power), fast at first and then slow, on both
+    sides of zero: a hint of a smile needs little, the last of it much."""
 
     def setting(self, effect: FloatArray) -> FloatArray:
         """The slider's position for a wanted effect, within the limits."""

@@ -41,32 +41,22 @@ SIDED = {
 
 @dataclass(frozen=True, eq=False)
 class Head:
-    """A head at rest.
-
-    Attributes
-    ----------
-    build : Build
-    vertices : array, shape (V, 3)
-        In cm.
-    faces : array of int, shape (F, 3)
-        Triangles, anticlockwise seen from outside.
-    colours : array, shape (V, 3)
-    tissue : array of int, shape (V,)
-        A `parts.Tissue` a vertex.
-    mirror : array of int, shape (V,)
-        The vertex on the other side; itself on the midline.
-    lids, lips : array of int
-        Loops of the left half, see `skin.Skin`.
-    """
+    """A head at rest."""
 
     build: Build
     vertices: FloatArray
+    """Positions in cm, (V, 3)."""
     faces: IntArray
+    """Triangles, anticlockwise seen from outside, (F, 3)."""
     colours: FloatArray
+    """RGB of the vertices, (V, 3)."""
     tissue: IntArray
+    """A `parts.Tissue` a vertex, (V,)."""
     mirror: IntArray
+    """The vertex on the other side; itself on the midline. Shape (V,)."""
     lids: IntArray
     lips: IntArray
+    """Loops of the left half, see `skin.Skin`."""
 
 
 def make_head(build: Build) -> Head:

@@ -23,21 +23,15 @@ _REACH = 2.8  # radians from the tip of the nose to the edge of the sheet, behin
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The left half of the skin.
-
-    Attributes
-    ----------
-    piece : Patch
-    lids : array of int, shape (4, n)
-        Loops around the eye, from the inner edge of the lids outwards; a loop starts at the outer
-        corner and runs over the upper lid.
-    lips : array of int, shape (8, 2 k + 1)
-        Rows of the mouth from the inside outwards; a row starts in the middle of the upper lip.
-    """
+    """The left half of the skin."""
 
     piece: Patch
     lids: IntArray
+    """Loops around the eye, from the inner edge of the lids outwards; a loop starts at the outer
+    corner and runs over the upper lid. Shape (4, n)."""
     lips: IntArray
+    """Rows of the mouth from the inside outwards; a row starts in the middle of the upper lip.
+    Shape (8, 2 k + 1)."""
 
 
 LID_EDGE = 1  # row of `Skin.lids` that bounds the opening

@@ -23,7 +23,7 @@ OUT_FILES: Mapping[str, tuple[str, ...]] = {"csv": (".csv",), "h5": (".h5", ".hd
 
 
 @dataclass(frozen=True)
-class Protocol:
+class NetworkProtocol:
     """A protocol over UDP: its usual ports, and what reads and writes its packets, where it can."""
 
     in_port: int
@@ -39,10 +39,6 @@ class Address:
     kind: str
     host: str
     port: int
-
-    def __str__(self) -> str:
-        """As it is written on the command line."""
-        return f"{self.kind}:{self.place}"
 
     @property
     def place(self) -> str:
@@ -113,6 +109,14 @@ def open_receiver(address: Address, listen: str, wanted: Take) -> UdpReceiver:
         When the port is taken, or the protocol cannot bring what the model wants.
     """
     decoder = PROTOCOLS[address.kind].decoder(wanted)
+    brought = decoder.pattern.source.kind
+    if brought != wanted.source.kind:
+        raise InputError(
+            f"--in {address.kind}",
+            f"{wanted.source.kind}, as the model was trained on",
+            brought,
+            "Give --in osc or --in take, or a model of tracked weights.",
+        )
     family, where = _resolve(address, listen)
     listening = socket.socket(family, socket.SOCK_DGRAM)
     try:
@@ -185,32 +189,16 @@ def _is_own(host: ipaddress.IPv4Address | ipaddress.IPv6Address) -> bool:
     return True
 
 
-def _weights_only(kind: str, decoder: Callable[[], Decoder]) -> Callable[[Take], Decoder]:
-    """What makes the decoder of a protocol that brings weights, for a model that wants some."""
-
-    def make(wanted: Take) -> Decoder:
-        if wanted.source.kind != "markers":
-            return decoder()
-        raise InputError(
-            f"--in {kind}",
-            "markers, as the model was trained on",
-            "weights",
-            "Give --in osc or --in take, or a model of tracked weights.",
-        )
-
-    return make
-
-
 def _named(wanted: Take) -> Decoder:
     """The decoder of a protocol that names its weights or markers."""
     return OscDecoder(wanted.source.names, wanted.source.kind, wanted.units)
 
 
-PROTOCOLS: Mapping[str, Protocol] = {
-    "livelink": Protocol(11111, _weights_only("livelink", LiveLinkDecoder), 11111, LiveLinkEncoder),
-    "vmc": Protocol(39540, _named, 39539, VmcEncoder),
-    "osc": Protocol(9000, _named, 9000, OscEncoder),
-    "ifacialmocap": Protocol(49983, _weights_only("ifacialmocap", IFacialMocapDecoder)),
+PROTOCOLS: Mapping[str, NetworkProtocol] = {
+    "livelink": NetworkProtocol(11111, lambda _: LiveLinkDecoder(), 11111, LiveLinkEncoder),
+    "vmc": NetworkProtocol(39540, _named, 39539, VmcEncoder),
+    "osc": NetworkProtocol(9000, _named, 9000, OscEncoder),
+    "ifacialmocap": NetworkProtocol(49983, lambda _: IFacialMocapDecoder()),
 }
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Source, SourceKind, Take
-
-if TYPE_CHECKING:
-    from facert.retarget.stream import Streamed
 
 
 class BadPacketError(ValueError):
@@ -21,43 +18,29 @@ class BadPacketError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """One observation of one sender.
-
-    Parameters
-    ----------
-    values : array, shape (D,) or (M, 3)
-        Weights or markers in the order of the decoder's pattern; NaN: not observed. All NaN when
-        the sender saw no face.
-    sender : str
-        Whose frame it is, where the packet names it.
-    stamp : float, optional
-        Seconds on the sender's clock.
-    identity : bytes, optional
-        The same for two frames only when one is a copy of the other.
-    """
+    """One observation of one sender."""
 
     values: FloatArray
+    """Weights or markers in the order of the decoder's pattern; NaN: not observed. All NaN when the
+    sender saw no face. Shape (D,) or (M, 3)."""
     sender: str = ""
+    """Whose frame it is, where the packet names it."""
     stamp: float | None = None
+    """Seconds on the sender's clock."""
     identity: bytes | None = None
+    """The same for two frames only when one is a copy of the other."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame of the session.
-
-    Parameters
-    ----------
-    time : float
-        Seconds since the session's first frame, strictly rising.
-    values : array, shape (D,) or (M, 3)
-    arrived : float
-        When it came in, by `time.perf_counter`.
-    """
+    """One frame of the session."""
 
     time: float
+    """Seconds since the session's first frame, strictly rising."""
     values: FloatArray
+    """Weights or markers, (D,) or (M, 3)."""
     arrived: float
+    """When it came in, by `time.perf_counter`."""
 
 
 def frame_pattern(names: Sequence[str], kind: SourceKind = "weights", units: str = "") -> Take:
@@ -118,38 +101,6 @@ class Encoder(Protocol):
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """The packets of a pose (P,) at a time in seconds."""
-        ...
-
-
-class Mapper(Protocol):
-    """A mapper of frames to poses."""
-
-    def step(self, frame: Frame) -> Streamed:
-        """The pose of the next frame; raises FacertError when there is none."""
-        ...
-
-    def prepare(self) -> None:
-        """Compute ahead for the next frame."""
-        ...
-
-    def rehearse(self, frame: Frame) -> Streamed:
-        """Map a frame without consequence, so that code and data are at hand for the next one."""
-        ...
-
-
-class Output(Protocol):
-    """A place for poses, such as a file."""
-
-    def send(self, frame: Frame, pose: Streamed) -> None:
-        """Pass on the pose of a frame, without waiting for anybody."""
-        ...
-
-
-class Sender(Output, Protocol):
-    """An output to which poses go before anything is recorded."""
-
-    def rehearse(self, frame: Frame, pose: Streamed) -> None:
-        """Do everything but pass the pose on."""
         ...
 
 

@@ -40,22 +40,14 @@ Signature = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Loaded:
-    """A retargeter with two streams of its own.
-
-    Parameters
-    ----------
-    retargeter : Retargeter
-    options : RetargetOptions
-    stream : RetargetStream
-        Maps the session's frames, which are taken to come at `fps`.
-    twin : RetargetStream
-        Rehearses them, so that the stream's memory stays what the frames made it.
-    """
+    """A retargeter with two streams of its own."""
 
     retargeter: Retargeter
     options: RetargetOptions
     stream: RetargetStream
+    """Maps the session's frames, which are taken to come at `fps`."""
     twin: RetargetStream
+    """Rehearses them, so that the stream's memory stays what the frames made it."""
     fps: float | None
 
     def calibrate(self, rest: FloatArray) -> None:
@@ -202,7 +194,7 @@ class LiveModel:
             self._loaded.stream.prepare()
 
     def rehearse(self, frame: Frame) -> Streamed:
-        """Map a frame on the twin; see `facert.live.frames.Mapper`."""
+        """Map a frame on the twin, without consequence, so that code and data are at hand."""
         return _finite(self._loaded.twin, frame)
 
     def _measure_rate(self, time: float) -> None:

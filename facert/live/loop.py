@@ -10,8 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from facert.errors import FacertError
-from facert.live.frames import Frame, Mapper, Output, Receiver, Sender
-from facert.live.recording import SourceRecord
+from facert.live.frames import Frame, Receiver
+from facert.live.live_model import LiveModel
+from facert.live.recording import PoseRecord, SourceRecord
+from facert.live.senders import UdpSender
 from facert.live.timing import Meter, Rhythm
 from facert.models.threads import threads_for
 
@@ -49,8 +51,8 @@ class LiveSession:
     Parameters
     ----------
     receiver : Receiver
-    mapper : Mapper
-    senders, records : sequences of Sender and Output
+    mapper : LiveModel
+    senders, records : sequences of UdpSender and PoseRecord
         Where a pose goes at once, and what keeps it then; latency is that of the senders.
     record : SourceRecord, optional
         Keeps every frame that came in.
@@ -59,9 +61,9 @@ class LiveSession:
     def __init__(
         self,
         receiver: Receiver,
-        mapper: Mapper,
-        senders: Sequence[Sender],
-        records: Sequence[Output] = (),
+        mapper: LiveModel,
+        senders: Sequence[UdpSender],
+        records: Sequence[PoseRecord] = (),
         record: SourceRecord | None = None,
     ) -> None:
         self.counters, self.meter = receiver.counters, Meter()

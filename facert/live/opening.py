@@ -73,19 +73,12 @@ class RestWatch:
 
 
 class Displacement(NamedTuple):
-    """How far the rigid motion of a face takes it.
-
-    Parameters
-    ----------
-    spread : float
-        Root mean square distance over the markers, in their units.
-    distance : float
-        Of their centre.
-    degrees : float
-    """
+    """How far the rigid motion of a face takes it."""
 
     spread: float
+    """Root mean square distance over the markers, in their units."""
     distance: float
+    """How far their centre moves."""
     degrees: float
 
 

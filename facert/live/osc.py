@@ -44,21 +44,13 @@ _PASSED = "NI[]"
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """An address and the texts and numbers that come with it.
-
-    Parameters
-    ----------
-    address : str
-    texts : tuple of str
-    numbers : tuple of float
-    place : int
-        Where its numbers are in the datagram, if all follow each other with 32 bits; else -1.
-    """
+    """An address and the texts and numbers that come with it."""
 
     address: str
     texts: tuple[str, ...]
     numbers: tuple[float, ...]
     place: int = field(default=-1, compare=False)
+    """Where its numbers are in the datagram, if all follow each other with 32 bits; else -1."""
 
 
 def parse(packet: bytes) -> list[Message]:

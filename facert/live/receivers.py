@@ -177,7 +177,7 @@ class TakeReceiver:
         ]
 
     def rehearse(self) -> None:
-        """There is nothing to understand."""
+        """Nothing is decoded."""
 
     def close(self) -> None:
         """Nothing is held."""

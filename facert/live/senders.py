@@ -72,7 +72,7 @@ class UdpSender:
                 self._counters.unsent += 1
 
     def rehearse(self, frame: Frame, pose: Streamed) -> None:
-        """Do what `send` does before it sends."""
+        """Do everything but send."""
         self._encoder.encode(pose.params, frame.time)
 
     def _connect(self) -> bool:

@@ -43,21 +43,15 @@ class Rhythm:
 
 @dataclass(frozen=True)
 class Pace:
-    """Rate and latency of some frames.
-
-    Attributes
-    ----------
-    rate : float
-        Frames a second; NaN before there are two.
-    median, p99, worst : float
-        Milliseconds from a packet's arrival in the process until its pose is sent; NaN before
-        there is one.
-    """
+    """Rate and latency of some frames."""
 
     rate: float
+    """Frames a second; NaN before there are two."""
     median: float
     p99: float
     worst: float
+    """Latency in milliseconds, from a packet's arrival in the process until its pose is sent; NaN
+    before there is one."""
 
 
 class Meter:

@@ -36,21 +36,15 @@ _MOST_SPELLINGS = 4096
 
 @dataclass(frozen=True, eq=False)
 class _Use:
-    """The use of a datagram's numbers, as far as they belong to one frame.
-
-    Parameters
-    ----------
-    columns, numbers : arrays of int, shape (k,)
-        Where values belong, and which of the numbers they are.
-    clock, end : slice or None
-        The numbers of the sender's clock, and of the message that completes the frame; None where
-        there is no such message.
-    """
+    """The use of a datagram's numbers, as far as they belong to one frame."""
 
     columns: IntArray
     numbers: IntArray
+    """`columns` are where values belong, `numbers` which of the numbers they are, (k,)."""
     clock: slice | None
     end: slice | None
+    """The numbers of the sender's `clock`, and of the message that is the frame's `end`; None where
+    there is no such message."""
 
 
 class OscDecoder(Decoder):

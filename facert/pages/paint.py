@@ -25,18 +25,12 @@ _STOPS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """Colours of a mesh.
-
-    Parameters
-    ----------
-    palette : array, shape (K, 3)
-        Red, green and blue, 0 to 1.
-    paint : array of int, shape (F,)
-        Which of them each triangle has.
-    """
+    """Colours of a mesh."""
 
     palette: FloatArray
+    """Red, green and blue, 0 to 1, (K, 3)."""
     paint: IntArray
+    """Which of them each triangle has, (F,)."""
 
 
 def skin(mesh: Mesh) -> Paint:
@@ -55,18 +49,12 @@ def skin(mesh: Mesh) -> Paint:
 
 @dataclass(frozen=True)
 class Scale:
-    """Colours for distances of vertices.
-
-    Parameters
-    ----------
-    top : float
-        The distance of the last colour, and of all beyond.
-    units : str
-        Of length.
-    """
+    """Colours for distances of vertices."""
 
     top: float
+    """The distance of the last colour, and of all beyond."""
     units: str = ""
+    """Units of length."""
 
     def paint(self, values: FloatArray, faces: IntArray) -> Paint:
         """Colours of triangles (F, 3) whose vertices are so far off, (V,)."""

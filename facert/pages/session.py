@@ -24,20 +24,13 @@ ENDING = ".posed.h5"
 
 @dataclass(frozen=True)
 class Trained:
-    """The outcome of training.
-
-    Parameters
-    ----------
-    labels : int
-        How many poses it learned from.
-    seconds : float
-    change : float or None
-        RMS by which the poses of the take moved; None the first time.
-    """
+    """The outcome of training."""
 
     labels: int
+    """How many poses it learned from."""
     seconds: float
     change: float | None
+    """RMS by which the poses of the take moved; None the first time."""
 
 
 class PosingSession:

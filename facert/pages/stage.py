@@ -66,20 +66,14 @@ class ColourLayer:
 
     The browser computes a vertex's normal from the layer's triangles alone: without the apron
     there would be a seam. The apron is hidden a little below the neighbours' own triangles.
-
-    Parameters
-    ----------
-    used : array of int, shape (n,)
-        Vertices of the whole mesh.
-    own : array of bool, shape (n,)
-        Which of them the coloured triangles have; the others are the apron's.
-    faces : array of int, shape (f, 3)
-        Among `used`.
     """
 
     used: IntArray
+    """Vertices of the whole mesh, (n,)."""
     own: BoolArray
+    """Which of them the coloured triangles have; the others are the apron's. Shape (n,)."""
     faces: IntArray
+    """Among `used`, (f, 3)."""
 
 
 def colour_layer(faces: IntArray, chosen: BoolArray) -> ColourLayer:

@@ -29,17 +29,6 @@ _LOOKED_AT = 48  # frames that show how far a scale goes
 class Performance:
     """A take of poses, with what is known beside it.
 
-    Parameters
-    ----------
-    take : Take
-        Frames of the source; with poses, and their standard deviation, if there are some.
-    key_poses : array of int
-        Frames that somebody posed.
-    rig : Rig, optional
-        The character.
-    truth : Take, optional
-        True poses of the same frames.
-
     Raises
     ------
     InputError
@@ -47,9 +36,13 @@ class Performance:
     """
 
     take: Take
+    """Frames of the source; with poses, and their standard deviation, if there are some."""
     key_poses: IntArray
+    """Frames that somebody posed."""
     rig: Rig | None = None
+    """The character."""
     truth: Take | None = None
+    """True poses of the same frames."""
 
     def __post_init__(self) -> None:
         if self.truth is None:

@@ -99,22 +99,14 @@ class Worker:
 
 @dataclass
 class Playback:
-    """The frame that is shown.
-
-    Parameters
-    ----------
-    time : array, shape (T,)
-        Seconds, rising.
-    frame : int
-    playing : bool
-    speed : float
-        Seconds of the performance a second.
-    """
+    """The frame that is shown."""
 
     time: FloatArray
+    """Seconds, rising, (T,)."""
     frame: int = 0
     playing: bool = False
     speed: float = 1.0
+    """Seconds of the performance a second."""
 
     def __post_init__(self) -> None:
         self._moment = float(self.time[self.frame])

@@ -15,26 +15,18 @@ _Pair = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What the pixels see; n of them see the mesh, in the order of the image.
-
-    Attributes
-    ----------
-    covered : array of bool, shape (H, W)
-        Rows from top to bottom.
-    depth : array, shape (n,)
-        Distance towards the viewer, in the mesh's unit.
-    normal : array, shape (3, n)
-        Unit normals, turned towards the viewer.
-    colour : array, shape (3, n)
-    inside : array of bool, shape (n,)
-        The pixel sees the back of a triangle.
-    """
+    """What the pixels see; n of them see the mesh, in the order of the image."""
 
     covered: BoolArray
+    """Rows from top to bottom, (H, W)."""
     depth: FloatArray
+    """Distance towards the viewer, in the mesh's unit, (n,)."""
     normal: FloatArray
+    """Unit normals, turned towards the viewer, (3, n)."""
     colour: FloatArray
+    """RGB of the mesh, (3, n)."""
     inside: BoolArray
+    """The pixel sees the back of a triangle, (n,)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,12 +63,13 @@ def test_the_example_in_the_message_is_one_that_is_understood():
         with pytest.raises(ValueError, match="as in") as caught:
             parse("vmx")
         example = str(caught.value).rpartition(" ")[2]
-        assert str(parse(example)).endswith(example.partition(":")[2])
+        assert parse(example).place.endswith(example.partition(":")[2])
 
 
 @pytest.mark.parametrize("text", ["vmc:127.0.0.1:39539", "vmc:[::1]:39539"])
 def test_an_address_is_written_as_it_is_given(text):
-    assert str(parse_output(text)) == text
+    address = parse_output(text)
+    assert f"{address.kind}:{address.place}" == text
 
 
 def test_an_unknown_host_is_an_error_before_the_show():
