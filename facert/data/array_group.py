@@ -18,7 +18,7 @@ class ArrayGroup:
 
     `axes` spells the shape of each array, a letter an axis. A letter stands for one size in all of
     them ("x" for d_x, "y" for d_y), a digit for itself: ``{"weights": "xy", "offset": "y"}``.
-    `parts` tells the type of each field that is a group.
+    `parts` has the type of each field that is a group.
 
     Raises
     ------
@@ -53,14 +53,14 @@ class ArrayGroup:
 
     @classmethod
     def of(cls, arrays: Mapping[str, FloatArray], prefix: str = "") -> Self:
-        """Put together again what `arrays` told."""
+        """The group of these arrays, named as `arrays` names them."""
         own = {name: arrays[prefix + name] for name in cls.axes}
         groups = {name: part.of(arrays, f"{prefix}{name}.") for name, part in cls.parts.items()}
         return cls(**own, **groups)
 
 
 def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dict[str, int]:
-    """The size that each letter stands for, found in the arrays; see `Map`.
+    """The size that each letter stands for, found in the arrays; see `ArrayGroup`.
 
     Raises
     ------

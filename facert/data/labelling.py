@@ -106,12 +106,9 @@ def _by_time(take: Take, poses: Poses) -> IntArray:
     astray = np.flatnonzero(~(distance <= 0.5 / take.fps + 1e-6))
     if len(astray):
         far, row = poses.time[astray[0]], frames[astray[0]]
-        raise InputError(
-            "time of the poses",
-            f"within half a frame of one of the take, such as {take.time[row]:.3f} s",
-            f"{far:.3f} s",
-            "Count seconds as the take does, or give a column frame.",
-        )
+        expected = f"within half a frame of one of the take, such as {take.time[row]:.3f} s"
+        fix = "Count seconds as the take does, or give a column frame."
+        raise InputError("time of the poses", expected, f"{far:.3f} s", fix)
     return frames
 
 
@@ -128,12 +125,8 @@ def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:
         return Controls(poses.names, poses.limits), np.arange(len(poses.names))
     order = match(take.controls.names, poses.names, "names of the poses")
     if len(order) != len(poses.names):
-        raise InputError(
-            "names of the poses",
-            f"the take's {len(take.controls.names)} controls",
-            f"{len(poses.names)}",
-            "Pose the same controls.",
-        )
+        expected, found = f"the take's {len(take.controls.names)} controls", f"{len(poses.names)}"
+        raise InputError("names of the poses", expected, found, "Pose the same controls.")
     return take.controls, order
 
 

@@ -46,7 +46,7 @@ _SIDES = {"l": "left", "r": "right"}
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[-+]?\d+|[^\W\d_a-zA-Z]+")
 _BETWEEN_NUMBERS = re.compile(r"(?<=\d) (?=\d)")
 
-# The first word of a name that begins like one of these tells the group.
+# The first word of a name that begins like one of these decides the group.
 _GROUP_STEMS = {
     "brows": ("brow", "eyebrow", "forehead"),
     "eyes": ("eye", "lid", "gaze", "blink", "pupil"),
@@ -190,12 +190,11 @@ def _require_different(
     if not len(shared):
         return
     first, second = (wanted[index] for index in np.flatnonzero(found == shared[0])[:2])
-    raise InputError(
-        field,
+    expected, fix = (
         f"a name each for {first!r} and {second!r}",
-        f"only {among[shared[0]]!r}",
         "Add the missing one, or rename it.",
     )
+    raise InputError(field, expected, f"only {among[shared[0]]!r}", fix)
 
 
 def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
@@ -225,12 +224,9 @@ def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
     if unknown:
         near = nearest(unknown[0], shapes)
         hint = f" (did you mean {near!r}?)" if near else ""
-        raise InputError(
-            "/target/names",
-            "controls that the rig has a shape for",
-            f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all",
-            "Give the rig of this take's character.",
-        )
+        unmatched = f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all"
+        expected, fix = "controls that the rig has a shape for", "Give the rig of its character."
+        raise InputError("/target/names", expected, unmatched, fix)
     drivers = np.zeros((len(controls), len(shapes)))
     for control, found in enumerate(driven):
         drivers[control, found] = 1.0
@@ -253,12 +249,9 @@ def _require_one_driver(
     twice = np.flatnonzero(drivers.sum(axis=0) > 1)
     if len(twice):
         first, second = (controls[index] for index in np.flatnonzero(drivers[:, twice[0]])[:2])
-        raise InputError(
-            "/target/names",
-            "controls with a shape each",
-            f"{first!r} and {second!r} for {shapes[twice[0]]!r}",
-            "Leave out one of them, or give the rig of this take's character.",
-        )
+        found = f"{first!r} and {second!r} for {shapes[twice[0]]!r}"
+        fix = "Leave out one of them, or give the rig of this take's character."
+        raise InputError("/target/names", "controls with a shape each", found, fix)
 
 
 def control_groups(names: Sequence[str]) -> dict[str, IntArray]:

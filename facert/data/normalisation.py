@@ -45,19 +45,11 @@ class Normalisation:
         mean = np.nanmean(values, axis=0)
         scale = float(np.nanstd(values, axis=0).max())
         if not np.isfinite(scale):
-            raise InputError(
-                field,
-                "numbers of a sensible size",
-                f"up to {np.nanmax(np.abs(values)):.1e}",
-                "Check the units.",
-            )
+            found = f"up to {np.nanmax(np.abs(values)):.1e}"
+            raise InputError(field, "numbers of a sensible size", found, "Check the units.")
         if not scale > STILL * max(float(np.nanmax(np.abs(values))), 1e-300):
-            raise InputError(
-                field,
-                "values that change over the rows",
-                "the same row throughout",
-                "Check that the right data was exported.",
-            )
+            expected, found = "values that change over the rows", "the same row throughout"
+            raise InputError(field, expected, found, "Check that the right data was exported.")
         return cls(mean, scale)
 
     def seen_from(self, other: Normalisation) -> Normalisation:

@@ -40,7 +40,7 @@ def parse_range(text: str, option: str) -> tuple[int, ...]:
 def parse_frames(text: str, option: str) -> tuple[int, ...]:
     """The frames of ``a..b``, all of them, or of a list such as ``0,12,30``, rising.
 
-    As `parse_range` but for the step of a range that tells none.
+    As `parse_range`, but a range without a step has step 1.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def default_step(low: int, high: int) -> int:
 def _numbers(
     text: str, option: str, bad: InputError, step_of: Callable[[int, int], int]
 ) -> tuple[int, ...]:
-    """The numbers, rising; `step_of` tells the step of a range without one."""
+    """The numbers, rising; `step_of` gives the step of a range without one."""
     numbers: set[int] = set()
     for part in map(str.strip, text.split(",")):
         found = _RANGE.fullmatch(part)

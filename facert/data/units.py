@@ -35,8 +35,8 @@ _FROM_Y = {
 def with_units(found: Take | Rig, units: str) -> Take | Rig:
     """The same positions in another unit.
 
-    Where the file does not say its unit, the numbers are taken to be in `units` already, and the
-    log tells so.
+    Where the file does not state its unit, the numbers are taken to be in `units` already, with a
+    line in the log.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
     """The same positions in a frame whose `up_axis` points up, turned from one with `present`.
 
     From z to y, (x, y, z) becomes (x, z, -y). Where `present` is empty, the positions are taken
-    to stand so already, and the log tells so.
+    to stand so already, with a line in the log.
 
     Raises
     ------
@@ -89,12 +89,8 @@ def checked_unit(name: str, field: str) -> str:
     """
     short = _SPELLINGS.get(name.strip().lower(), name.strip().lower())
     if short not in METRES:
-        raise InputError(
-            field,
-            ", ".join(METRES),
-            repr(name),
-            "Choose one of these; --in-units overrides a file.",
-        )
+        fix = "Choose one of these; --in-units overrides a file."
+        raise InputError(field, ", ".join(METRES), repr(name), fix)
     return short
 
 

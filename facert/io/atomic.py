@@ -46,13 +46,9 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
         temporary.replace(path)
         _flush(path.parent)
     except OSError as error:
-        raise InputError(
-            "output",
-            "a file name in a folder that can be written to",
-            error.strerror or str(error),
-            "Choose another place, or make room there.",
-            where=str(path),
-        ) from error
+        expected, found = "a name in a folder that can be written to", error.strerror or str(error)
+        fix = "Choose another place, or make room there."
+        raise InputError("output", expected, found, fix, where=str(path)) from error
     finally:
         _discard(temporary)
 

@@ -117,9 +117,8 @@ def _document(path: Path) -> Document:
         raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
     packed = sorted(set(_PACKED) & set(root.get("extensionsRequired", [])))
     if packed:
-        raise InputError(
-            "extensionsRequired", "plain geometry", packed[0], "Export it without compression."
-        )
+        fix = "Export it without compression."
+        raise InputError("extensionsRequired", "plain geometry", packed[0], fix)
     buffers = enumerate(root.get("buffers", []))
     return Document(root, [_buffer(one.get("uri"), path.parent, own, i) for i, one in buffers])
 
@@ -133,12 +132,8 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
             raise ValueError
         size, other = struct.unpack_from("<II", rest) if len(rest) >= 8 else (0, 0)
     except (struct.error, ValueError):
-        raise InputError(
-            "file",
-            "a whole GLB file of version 2",
-            "another or a truncated one",
-            "Export it again.",
-        ) from None
+        expected, found = "a whole GLB file of version 2", "another or a truncated one"
+        raise InputError("file", expected, found, "Export it again.") from None
     return content[20 : 20 + length], rest[8 : 8 + size] if other == _BINARY else None
 
 

@@ -132,20 +132,12 @@ class GuardedFile:
         """Check the file's own statement of what it is."""
         found = self.text_attribute("format", "nothing")
         if found != name:
-            raise InputError(
-                "attribute format",
-                repr(name),
-                repr(found),
-                "Give a file of this kind, or make one with facert convert.",
-            )
+            fix = "Give a file of this kind, or make one with facert convert."
+            raise InputError("attribute format", repr(name), repr(found), fix)
         found_version = self.number_attribute("format_version")
         if not 1 <= found_version <= version:
-            raise InputError(
-                "attribute format_version",
-                f"1 to {version}",
-                f"{found_version:g}",
-                "Update facert to read a newer file.",
-            )
+            field, fix = "attribute format_version", "Update facert to read a newer file."
+            raise InputError(field, f"1 to {version}", f"{found_version:g}", fix)
 
     def _find(self, path: str) -> Any:
         """Open the object at `path`, or None; h5py's own look-ups follow links, so not those."""
@@ -157,12 +149,7 @@ class GuardedFile:
             if not links.exists(name):
                 return None
             if links.get_info(name).type != h5py.h5l.TYPE_HARD:
-                raise InputError(
-                    path,
-                    "data in the file itself",
-                    f"a soft or external link at {part!r}",
-                    "Copy the data into the file.",
-                )
+                raise _outside(path, f"a soft or external link at {part!r}")
             here = _guarded_read(here, path, part)
         return here
 
@@ -337,21 +324,15 @@ def _check_layout(dataset: h5py.Dataset, path: str) -> None:
     """Refuse data that lie in other files or need plug-ins."""
     properties = dataset.id.get_create_plist()
     if dataset.is_virtual or properties.get_external_count():
-        raise InputError(
-            path,
-            "data in the file itself",
-            "a virtual dataset or external storage",
-            "Copy the data into the file.",
-        )
+        raise _outside(path, "a virtual dataset or external storage")
     filters = [properties.get_filter(index) for index in range(properties.get_nfilters())]
     foreign = [number for number, *_ in filters if number not in _PLAIN_FILTERS]
     if foreign:
-        raise InputError(
-            path,
-            "no filter but gzip, lzf, shuffle and fletcher32",
-            f"filter {foreign[0]}",
+        expected, fix = (
+            "only gzip, lzf, shuffle and fletcher32",
             "Write it again with one of these.",
         )
+        raise InputError(path, expected, f"filter {foreign[0]}", fix)
     if dataset.shape is None:
         raise _unexpected(path, "an array", "an empty dataspace")
 
@@ -383,6 +364,10 @@ def _guarded_read(container: Any, path: str, key: Any) -> Any:
 
 def _describe(dataset: h5py.Dataset) -> str:
     return f"{dataset.dtype} {dataset.shape}"
+
+
+def _outside(path: str, found: str) -> InputError:
+    return InputError(path, "data in the file itself", found, "Copy the data into the file.")
 
 
 def _unexpected(path: str, expected: str, found: str) -> InputError:

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from facert.errors import InputError, reading
+from facert.errors import reading
+from facert.io.atomic import replacing
 from facert.io.guarded import read_text
 
 log = logging.getLogger(__name__)
@@ -43,17 +44,8 @@ class Journal:
         entries = self._entries()
         header = {"fingerprint": self._fingerprint}
         text = "".join(json.dumps(line) + "\n" for line in (header, *entries))
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise InputError(
-                "journal",
-                "a file that can be written",
-                str(error),
-                "Choose another place.",
-                str(self.path),
-            ) from error
+        with replacing(self.path, overwrite=True) as temporary:
+            temporary.write_text(text, encoding="utf-8")
         return entries
 
     def add(self, entry: Mapping[str, Any]) -> None:
@@ -78,7 +70,7 @@ class Journal:
 
 
 def source_digest(folder: Path) -> str:
-    """Of all Python files below a folder: work of other code is other work."""
+    """A digest of all Python files below a folder: work of other code is other work."""
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
         digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())

@@ -110,21 +110,17 @@ def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
     columns = _arkit_columns(take)
     known = np.asarray(~np.isnan(columns).all(axis=1))
     if np.isnan(columns[known]).any():
-        raise InputError(
-            "/source/weights",
-            "frames that are known as a whole",
-            "frames that are known in part",
-            "Fill the gaps first (facert retarget does), or write a .csv table.",
-        )
+        expected, found = "frames that are known as a whole", "frames that are known in part"
+        fix = "Fill the gaps first (facert retarget does), or write a .csv table."
+        raise InputError("/source/weights", expected, found, fix)
     code = take.start_timecode or "00:00:00:00.000"
     counted = LIVE_LINK_RATE if has_thousandths(code) else max(1, round(take.fps))
     start = parse_timecode(code, counted)
     if start is None:  # FF beyond the rate: the app's sixtieths, written short
         start = parse_timecode(code)
     if start is None:
-        raise InputError(
-            "start_timecode", "HH:MM:SS:FF.mmm", take.start_timecode, "Correct the attribute."
-        )
+        found = take.start_timecode
+        raise InputError("start_timecode", "HH:MM:SS:FF.mmm", found, "Correct the attribute.")
     return start + np.rint(take.time * TICKS).astype(np.int64), columns
 
 
@@ -135,9 +131,8 @@ def _rows_with_face(rows: Sequence[Line]) -> list[Line]:
         text = "dropped %d of %d rows without a face: frames are counted without them"
         log.info(text, dropped, len(rows))
     if not kept:
-        raise InputError(
-            "BlendShapeCount", "rows with a face", "none", "Record again with the face in view."
-        )
+        fix = "Record again with the face in view."
+        raise InputError("BlendShapeCount", "rows with a face", "none", fix)
     return kept
 
 
@@ -223,12 +218,9 @@ def _arkit_columns(take: Take) -> FloatArray:
     foreign = [name for name in names if canonical(name) not in ARKIT_NAMES]
     if foreign:
         near = nearest(foreign[0], ARKIT_NAMES)
-        raise InputError(
-            field,
-            "ARKit shapes and angles",
-            f"{foreign[0]!r}" + (f" (nearest: {near!r})" if near else ""),
-            "Write a plain table, with a name that ends in .csv but not in .livelink.csv.",
-        )
+        found = f"{foreign[0]!r}" + (f" (nearest: {near!r})" if near else "")
+        fix = "Write a plain table, with a name that ends in .csv but not in .livelink.csv."
+        raise InputError(field, "ARKit shapes and angles", found, fix)
     columns = np.zeros((len(values), len(ARKIT_NAMES)))
     columns[np.isnan(values).all(axis=1)] = np.nan
     columns[:, match(names, ARKIT_NAMES, field)] = values

@@ -35,13 +35,10 @@ def read_obj_folder(folder: Path) -> Rig:
     neutral_file = next((path for path in files if path.stem.lower() == NEUTRAL), None)
     shape_files = [path for path in files if path != neutral_file]
     if neutral_file is None or not shape_files:
-        raise InputError(
-            "folder",
-            f"{NEUTRAL}.obj and one OBJ file a shape",
-            ", ".join(path.name for path in files[:4]) or "no OBJ files",
-            "Export the rest pose under that name, and every shape beside it.",
-            where=str(folder),
-        )
+        expected = f"{NEUTRAL}.obj and one OBJ file a shape"
+        found = ", ".join(path.name for path in files[:4]) or "no OBJ files"
+        fix = "Export the rest pose under that name, and every shape beside it."
+        raise InputError("folder", expected, found, fix, where=str(folder))
     neutral, faces = _vertices_and_faces(neutral_file)
     shapes = [_read_shape(path, neutral, faces) - neutral for path in shape_files]
     with reading(folder):
@@ -74,12 +71,8 @@ def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
                 elif keyword == "f":
                     triangles += _fan([_vertex(field, len(vertices)) for field in fields])
             except ValueError:
-                raise InputError(
-                    f"line {number}",
-                    "v X Y Z or f A B C ...",
-                    repr(line[:60]),
-                    "Export the file again.",
-                ) from None
+                field, expected = f"line {number}", "v X Y Z or f A B C ..."
+                raise InputError(field, expected, repr(line[:60]), "Export it again.") from None
         if not vertices:
             raise InputError("file", "vertices", "none", "Export the mesh again.")
     return np.array(vertices), np.array(triangles, dtype=np.int64).reshape(-1, 3)
@@ -88,13 +81,11 @@ def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
 def _read_shape(path: Path, neutral: FloatArray, faces: IntArray) -> FloatArray:
     vertices, own_faces = _vertices_and_faces(path)
     if vertices.shape != neutral.shape:
-        raise InputError(
-            "vertices",
+        expected, fix = (
             f"{len(neutral)} as in {NEUTRAL}.obj",
-            f"{len(vertices)}",
-            "Export all shapes from one mesh, and keep the vertex order.",
-            where=str(path),
+            "Keep one vertex order in all shapes.",
         )
+        raise InputError("vertices", expected, f"{len(vertices)}", fix, where=str(path))
     if len(own_faces) and not np.array_equal(own_faces, faces):
         log.warning("%s: other faces than the neutral; is the vertex order the same?", path.name)
     return vertices

@@ -8,8 +8,8 @@ triangle fans.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +29,11 @@ _TYPES = {
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
+_LENGTH = "length of "
 _CORNERS = ("vertex_indices", "vertex_index")
 _COLOURS = ("red", "green", "blue")
 
+_Field = tuple[str, str, tuple[int, ...]]
 Columns = dict[str, NDArray[np.generic] | list[NDArray[np.generic]]]
 """The values of each property: an array, or a list of arrays where rows differ in length."""
 
@@ -52,12 +54,6 @@ class _Element:
     properties: list[_Property]
 
 
-@dataclass(frozen=True)
-class _Header:
-    text: bool
-    elements: list[_Element]
-
-
 def read_ply(path: Path) -> Mesh:
     """Read the mesh of a PLY file.
 
@@ -69,9 +65,9 @@ def read_ply(path: Path) -> Mesh:
     with reading(path):
         content = moderate_file(path).read_bytes()
         end = _end_of_header(content)
-        header = _parse_header(content[:end])
-        body = _as_float64(content[end:]) if header.text else content[end:]
-        return _mesh(dict(_read_elements(header, body)), header)
+        elements, text = _parse_header(content[:end])
+        body = _as_float64(content[end:]) if text else content[end:]
+        return _mesh(_read_elements(elements, body, text), elements)
 
 
 def _end_of_header(content: bytes) -> int:
@@ -83,7 +79,8 @@ def _end_of_header(content: bytes) -> int:
     return end + 1
 
 
-def _parse_header(content: bytes) -> _Header:
+def _parse_header(content: bytes) -> tuple[list[_Element], bool]:
+    """The elements, and whether they are written as text."""
     order, text, elements = "<", False, list[_Element]()
     for number, line in enumerate(content.decode("ascii", errors="replace").splitlines(), 1):
         try:
@@ -100,10 +97,9 @@ def _parse_header(content: bytes) -> _Header:
                 case ["property" | "element" | "format", *_]:
                     raise ValueError
         except (KeyError, ValueError, IndexError):
-            raise InputError(
-                f"line {number}", "a PLY header", repr(line[:60]), "Export the mesh again."
-            ) from None
-    return _Header(text, elements)
+            found, fix = repr(line[:60]), "Export the mesh again."
+            raise InputError(f"line {number}", "a PLY header", found, fix) from None
+    return elements, text
 
 
 def _as_float64(body: bytes) -> bytes:
@@ -114,70 +110,56 @@ def _as_float64(body: bytes) -> bytes:
         raise InputError("data", "numbers", str(error), "Export the mesh again.") from None
 
 
-def _read_elements(header: _Header, body: bytes) -> Iterator[tuple[str, Columns]]:
-    offset = 0
-    for element in header.elements:
-        if header.text:
-            element = _Element(element.name, element.count, _all_float64(element.properties))
+def _read_elements(elements: list[_Element], body: bytes, text: bool) -> dict[str, Columns]:
+    offset, found = 0, dict[str, Columns]()
+    for element in elements:
         try:
-            columns, offset = _read_element(element, body, offset)
+            found[element.name], offset = _read_element(element, body, offset, text)
         except (ValueError, OverflowError):
-            expected = f"{element.count} whole rows"
-            raise InputError(
-                f"element {element.name}", expected, "fewer or damaged ones", "Export it again."
-            ) from None
-        yield element.name, columns
+            field, expected = f"element {element.name}", f"{element.count} whole rows"
+            damage = "fewer or damaged ones"
+            raise InputError(field, expected, damage, "Export it again.") from None
+    return found
 
 
-def _all_float64(properties: list[_Property]) -> list[_Property]:
-    return [_Property(one.name, "<f8", "<f8" if one.length else "") for one in properties]
-
-
-def _read_element(element: _Element, body: bytes, offset: int) -> tuple[Columns, int]:
+def _read_element(element: _Element, body: bytes, offset: int, text: bool) -> tuple[Columns, int]:
     """All rows at once if their lists are as long as the first row's, else one by one."""
-    if not element.count or not element.properties:
+    names = [one.name for one in element.properties]
+    if not element.count or not names:
         return {}, offset
-    first, _ = _read_row(element, body, offset)
-    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    for one, values in zip(element.properties, first, strict=True):
-        if one.length:
-            fields += [(f"length of {one.name}", one.length), (one.name, one.type, values.shape)]
-        else:
-            fields.append((one.name, one.type))
-    dtype = np.dtype(fields)
+    dtype = _row_type(element, body, offset, text)
     if offset + element.count * dtype.itemsize <= len(body):
         rows = np.frombuffer(body, dtype, element.count, offset)
-        lengths = [rows[name] for name in dtype.names or () if name.startswith("length of ")]
+        lengths = [rows[name] for name in dtype.names or () if name.startswith(_LENGTH)]
         if all((length == length[0]).all() for length in lengths):
-            columns: Columns = {one.name: rows[one.name] for one in element.properties}
-            return columns, offset + rows.nbytes
+            return {name: rows[name] for name in names}, offset + rows.nbytes
     if element.count > MAX_RAGGED or not any(one.length for one in element.properties):
         raise ValueError("too many rows, or too few bytes")
-    return _read_ragged(element, body, offset)
-
-
-def _read_ragged(element: _Element, body: bytes, offset: int) -> tuple[Columns, int]:
-    rows = []
+    ragged = []
     for _ in range(element.count):
-        row, offset = _read_row(element, body, offset)
-        rows.append(row)
-    columns = zip(*rows, strict=True)
-    names = (one.name for one in element.properties)
-    return {name: list(column) for name, column in zip(names, columns, strict=True)}, offset
+        dtype = _row_type(element, body, offset, text)
+        ragged.append(np.frombuffer(body, dtype, 1, offset)[0])
+        offset += dtype.itemsize
+    return {name: [np.atleast_1d(row[name]) for row in ragged] for name in names}, offset
 
 
-def _read_row(element: _Element, body: bytes, offset: int) -> tuple[list[NDArray[np.generic]], int]:
-    """The values of each property in the row that begins at `offset`, and where it ends."""
-    row = []
+def _row_type(element: _Element, body: bytes, offset: int, text: bool) -> np.dtype[np.void]:
+    """The layout of the row that begins at `offset`, whose lists are as long as it states."""
+    fields: list[_Field] = []
     for one in element.properties:
-        count = 1
+        shape: tuple[int, ...] = ()
         if one.length:
-            count = _length(int(np.frombuffer(body, one.length, 1, offset)[0]))
-            offset += np.dtype(one.length).itemsize
-        values = np.frombuffer(body, one.type, count, offset)
-        offset += values.nbytes
-        row.append(values)
-    return row, offset
+            length = "<f8" if text else one.length
+            start = offset + _layout(tuple(fields)).itemsize
+            shape = (_length(int(np.frombuffer(body, length, 1, start)[0])),)
+            fields.append((_LENGTH + one.name, length, ()))
+        fields.append((one.name, "<f8" if text else one.type, shape))
+    return _layout(tuple(fields))
+
+
+@lru_cache(maxsize=256)
+def _layout(fields: tuple[_Field, ...]) -> np.dtype[np.void]:
+    return np.dtype(list(fields))
 
 
 def _length(count: int) -> int:
@@ -186,14 +168,14 @@ def _length(count: int) -> int:
     return count
 
 
-def _mesh(elements: dict[str, Columns], header: _Header) -> Mesh:
-    vertex, face = elements.get("vertex", {}), elements.get("face", {})
+def _mesh(columns: dict[str, Columns], elements: list[_Element]) -> Mesh:
+    vertex, face = columns.get("vertex", {}), columns.get("face", {})
     vertices = _stacked(vertex, ("x", "y", "z"))
     if vertices is None:
         raise InputError("element vertex", "x, y, z", "none", "Export the mesh again.")
     colours = _stacked(vertex, _COLOURS)
     if colours is not None:
-        colours = colours / _brightest(header)
+        colours = colours / _brightest(elements)
     corners = next((face[name] for name in _CORNERS if name in face), [])
     return Mesh(vertices, _triangles(corners), colours=colours)
 
@@ -204,9 +186,9 @@ def _stacked(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     return np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names])
 
 
-def _brightest(header: _Header) -> float:
+def _brightest(elements: list[_Element]) -> float:
     """The value of full red in the file: 1 for floats, the type's largest for integers."""
-    vertex = next(element for element in header.elements if element.name == "vertex")
+    vertex = next(element for element in elements if element.name == "vertex")
     red = next(np.dtype(one.type) for one in vertex.properties if one.name == "red")
     return float(np.iinfo(red).max) if red.kind in "iu" else 1.0
 

@@ -44,13 +44,12 @@ def _require_set(take: Take, path: Path) -> None:
     """Refuse a result of retargeting: what a model predicted would pass for somebody's poses."""
     predicted = predicted_poses(take)
     if predicted and predicted == len(take.labels):
-        raise InputError(
-            "/target/std",
-            "poses that somebody set",
-            f"a standard deviation for all {predicted}: a model predicted them",
-            f"Give the poses that were set; to take these nonetheless, make a table of them first: "
-            f"facert convert {path.name} {path.stem}.csv.",
+        found = f"a standard deviation for all {predicted}: a model predicted them"
+        fix = (
+            "Give the poses that were set; to take these nonetheless, make a table of them first: "
         )
+        table = f"facert convert {path.name} {path.stem}.csv."
+        raise InputError("/target/std", "poses that somebody set", found, fix + table)
     if predicted:
         poses = plural(predicted, "pose")
         log.warning("%s: %s with a standard deviation: predicted, taken as set", path.name, poses)

@@ -80,12 +80,8 @@ def _clock_column(header: Sequence[str]) -> int:
     for name in ("time", "frame"):
         if name in lower:
             return lower.index(name)
-    raise InputError(
-        "header",
-        "a column time (seconds) or frame",
-        ", ".join(header[:4]),
-        "Add one; or name the columns as Live Link Face does.",
-    )
+    fix = "Add one; or name the columns as Live Link Face does."
+    raise InputError("header", "a column time (seconds) or frame", ", ".join(header[:4]), fix)
 
 
 def _clock(values: FloatArray, column: str, fps: float | None) -> tuple[FloatArray, float]:
@@ -93,12 +89,8 @@ def _clock(values: FloatArray, column: str, fps: float | None) -> tuple[FloatArr
     if column.lower() == "time":
         return values, nominal_rate(values)
     if fps is None:
-        raise InputError(
-            "column frame",
-            "the rate of the frames",
-            "none",
-            "Add a column time, or run facert convert with --in-fps.",
-        )
+        fix = "Add a column time, or run facert convert with --in-fps."
+        raise InputError("column frame", "the rate of the frames", "none", fix)
     return values / fps, fps
 
 
@@ -113,10 +105,7 @@ def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:
     if 3 * len(whole) != len(header):
         in_markers = {place[name, axis] for name in whole for axis in "xyz"}
         odd = next(name for i, name in enumerate(header) if i not in in_markers)
-        raise InputError(
-            f"column {odd}",
-            "markers only, each with x, y and z",
-            "another column",
-            "Remove it: a take's source is markers or weights, not both.",
-        )
+        expected = "markers only, each with x, y and z"
+        fix = "Remove it: a take's source is markers or weights, not both."
+        raise InputError(f"column {odd}", expected, "another column", fix)
     return tuple(whole), np.array([[place[name, axis] for axis in "xyz"] for name in whole])

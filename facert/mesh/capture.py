@@ -40,7 +40,7 @@ def simulate_capture(
 
     Weights and shapes are matched by name, in any spelling; one weight may drive both halves of a
     shape that the rig splits in two (``browInnerUp``, ``cheekPuff``). Shapes without a weight rest.
-    Weights without a shape are left out of the target. Both are told in the log.
+    Weights without a shape are left out of the target. The log names both.
 
     Parameters
     ----------
@@ -80,7 +80,8 @@ def simulate_capture(
     actor = Rig(rig.neutral[chosen], rig.shapes[:, chosen], rig.names, np.empty((0, 3), np.int64))
     positions = actor.deform(_shape_weights(drive, performance.source.values))
     _, noise_seed, gap_seed = np.random.SeedSequence(seed).spawn(3)
-    positions += noise * _largest_deviation(positions) * _normal(positions.shape, noise_seed)
+    scatter = np.random.default_rng(noise_seed).standard_normal(positions.shape)
+    positions += noise * _largest_deviation(positions) * scatter
     positions[np.random.default_rng(gap_seed).random(positions.shape[:2]) < missing] = np.nan
     used = np.unique(drive[drive >= 0])
     params = performance.source.values[:, used]
@@ -139,15 +140,13 @@ def _drive(rig: Rig, source: Source) -> IntArray:
         )
     drive = _matching_weights(rig.names, source.names)
     if (drive < 0).all():
-        raise InputError(
-            "/source/names",
-            f"names of the rig's shapes, e.g. {rig.names[0]!r}",
-            f"none of them, e.g. {source.names[0]!r}",
-            "Choose other shapes of the rig, or rename them.",
-        )
-    _tell("shape", "of the rig without a weight", [rig.names[i] for i in np.flatnonzero(drive < 0)])
+        expected = f"names of the rig's shapes, e.g. {rig.names[0]!r}"
+        found = f"none of them, e.g. {source.names[0]!r}"
+        fix = "Choose other shapes of the rig, or rename them."
+        raise InputError("/source/names", expected, found, fix)
+    _log("shape", "of the rig without a weight", [rig.names[i] for i in np.flatnonzero(drive < 0)])
     unused = np.setdiff1d(np.arange(len(source.names)), drive)
-    _tell("weight", "without a shape of the rig", [source.names[i] for i in unused])
+    _log("weight", "without a shape of the rig", [source.names[i] for i in unused])
     return drive
 
 
@@ -178,10 +177,6 @@ def _largest_deviation(positions: FloatArray) -> float:
     return float(known.std(axis=0).max()) if len(known) else 0.0
 
 
-def _normal(shape: tuple[int, ...], seed: np.random.SeedSequence) -> FloatArray:
-    return np.random.default_rng(seed).standard_normal(shape)
-
-
 def _checked_vertices(rig: Rig, vertices: ArrayLike) -> IntArray:
     chosen = np.atleast_1d(np.asarray(vertices))  # checked before int64: it may not fit
     inside = ((chosen >= 0) & (chosen < len(rig.neutral))).all()
@@ -197,6 +192,6 @@ def _check(good: bool, option: str, expected: str, found: object) -> None:
         raise InputError(option, expected, found, "Choose another value.", where="options")
 
 
-def _tell(noun: str, what: str, names: Sequence[str]) -> None:
+def _log(noun: str, what: str, names: Sequence[str]) -> None:
     if names:
         log.info("%s %s: %s", plural(len(names), noun), what, ", ".join(names))

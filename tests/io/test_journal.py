@@ -36,7 +36,7 @@ def test_a_journal_of_other_work_is_begun_anew(tmp_path, text):
 def test_a_place_that_cannot_be_written_to_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     path = tmp_path / "file" / "journal.jsonl"
-    with pytest.raises(InputError, match=r"journal\.jsonl: journal: expected a file"):
+    with pytest.raises(InputError, match=r"journal\.jsonl: output: expected a name in a folder"):
         Journal(path, "work").begin()
 
 

@@ -16,7 +16,7 @@ from facert.io.registry import listed
 
 if TYPE_CHECKING:
     from facert.cli.shared.conversion import Wanted
-    from facert.data.conversion import Changes
+    from facert.data.changes import Changes
 
 
 class Kind(StrEnum):
@@ -82,7 +82,7 @@ def command(
     facert convert retargeted.h5 face.glb --rig facert-demo/character.h5
     """
     from facert.cli.shared.conversion import KINDS, Wanted
-    from facert.data.conversion import Changes
+    from facert.data.changes import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
 

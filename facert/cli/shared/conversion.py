@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data.conversion import Changes, converted, in_space
+from facert.data.changes import Changes, converted, in_space
 from facert.data.labelling import weights_as_poses
 from facert.data.rig import Rig
 from facert.data.take import Take

@@ -22,7 +22,7 @@ START = 1.0  # the frame of the first key
 
 
 def key_shapes(path: str, name: str = "") -> None:
-    """Key the shape keys of an object; tell what it has no shape key for."""
+    """Key the shape keys of an object; print the curves that it has no shape key for."""
     face = bpy.data.objects[name] if name else bpy.context.active_object
     shapes = face.data.shape_keys
     render = bpy.context.scene.render

@@ -18,7 +18,7 @@ START = 0.0  # seconds of the first key
 
 
 def key_attributes(path: str, node: str = "") -> None:
-    """Key the attributes of a node; tell what it has no attribute for."""
+    """Key the attributes of a node; warn of the curves that it has no attribute for."""
     curves = read_curves(path)
     there = _attributes(node)
     for control in curves.values:

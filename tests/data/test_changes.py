@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facert.data.name_map import renamed
+from facert.data.changes import renamed
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError

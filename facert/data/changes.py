@@ -1,15 +1,15 @@
-"""What converting a take or a rig changes in it, besides the format of its file."""
+"""Changes of a take or a rig, as `convert` makes them: names, poses, unit and axis, rate."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from facert.data.labelling import Poses, labelled
-from facert.data.name_map import renamed
+from facert.data.names import NameIndex, nearest
 from facert.data.resampling import resampled
 from facert.data.rig import Rig
-from facert.data.take import Take
+from facert.data.take import Controls, Take
 from facert.data.timecode import timecode
 from facert.data.units import with_units, with_up_axis
 from facert.errors import InputError
@@ -22,13 +22,13 @@ class Changes:
     Parameters
     ----------
     names : mapping
-        From names in the file to new ones, see `facert.data.name_map.renamed`.
+        From names in the file to new ones, see `renamed`.
     poses : Poses, optional
         Labels to add, by the frames and times of the file.
     fps : float, optional
         Frames a second to resample to.
     in_units, in_up_axis : str
-        What the numbers in the file are in, whatever it says.
+        What the numbers in the file are in, whatever it states.
     units, up_axis : str
         What to convert them to.
     start_timecode : str
@@ -97,3 +97,55 @@ def _in_time(take: Take, changes: Changes) -> Take:
     if start and not timecode(start, 0.0, take.fps):
         raise InputError("--start-timecode", "HH:MM:SS:FF", repr(start), "Correct it.")
     return replace(take, start_timecode=start) if start else take
+
+
+def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
+    """The same take or rig with other names.
+
+    Parameters
+    ----------
+    found : Take or Rig
+    names : mapping
+        From the names in the file, in any spelling, to the new ones. Of a take the markers or
+        weights and the controls are renamed. What is not in the mapping keeps its name.
+
+    Raises
+    ------
+    InputError
+        For a name that the file does not have, with the nearest one that it has; for two that
+        would bear one name.
+    """
+    for theirs, ours in names.items():
+        if not isinstance(ours, str):
+            expected = 'a name, as in theirs = "ours"'
+            raise InputError(theirs, expected, repr(ours), "Correct the map.")
+    if isinstance(found, Rig):
+        _require_known(names, found.names)
+        return replace(found, names=_renamed(found.names, names))
+    controls = found.controls
+    _require_known(names, (*found.source.names, *(controls.names if controls else ())))
+    source = replace(found.source, names=_renamed(found.source.names, names))
+    if controls is not None:
+        controls = Controls(_renamed(controls.names, names), controls.limits)
+    return replace(found, source=source, controls=controls)
+
+
+def _require_known(names: Iterable[str], there: Sequence[str]) -> None:
+    """Refuse a name that is nowhere in the file."""
+    index = NameIndex(tuple(dict.fromkeys(there)))
+    unknown = [name for name in names if index.find(name) is None]
+    if unknown:
+        near = nearest(unknown[0], there)
+        more = f" ({len(unknown) - 1} more)" if len(unknown) > 1 else ""
+        expected = f"names in the file, such as {near or there[0]!r}"
+        fix = f"Did you mean {near!r}?" if near else "Correct the map."
+        raise InputError("--map", expected, f"{unknown[0]!r}{more}", fix)
+
+
+def _renamed(present: Sequence[str], names: Mapping[str, object]) -> tuple[str, ...]:
+    index, result = NameIndex(present), list(present)
+    for theirs, ours in names.items():
+        place = index.find(theirs)
+        if place is not None:
+            result[place] = str(ours)
+    return tuple(result)
