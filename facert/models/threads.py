@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 
 from threadpoolctl import ThreadpoolController
@@ -43,10 +43,14 @@ def _one_torch_thread() -> Iterator[None]:
 
 
 @contextmanager
+def one_thread() -> Iterator[None]:
+    """Run the block with one thread."""
+    with _controller(_torch_is_here()).limit(limits=1), _one_torch_thread():
+        yield
+
+
+@contextmanager
 def threads_for(points: int) -> Iterator[None]:
     """Run the block with one thread when the matrices have at most `SMALL` rows."""
-    if points > SMALL:
-        yield
-        return
-    with _controller(_torch_is_here()).limit(limits=1), _one_torch_thread():
+    with nullcontext() if points > SMALL else one_thread():
         yield

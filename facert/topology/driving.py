@@ -72,20 +72,15 @@ def smooth_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:
     To (9) an affine map of a tangent plane is free, and a thin strip of triangles may turn as it
     likes. The second term holds it to its surroundings.
     """
-    smoothness = laplacian.uniform_energy(faces, len(vertices))
+    smoothness = laplacian.uniform_energy(vertices, faces)
     return sparse.csc_array(framework_energy(vertices, faces) + SMOOTHNESS * smoothness)
-
-
-def uniform_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:
-    """Laplacian editing with uniform weights, (V, V)."""
-    return laplacian.uniform_energy(faces, len(vertices))
 
 
 METHODS = {
     "smooth": DrivingMethod(smooth_energy),
     "framework": DrivingMethod(framework_energy),
     "literal": DrivingMethod(framework_energy, displacements=False),  # (9) as it is written
-    "laplacian": DrivingMethod(uniform_energy),
+    "laplacian": DrivingMethod(laplacian.uniform_energy),
     "cotangent": DrivingMethod(laplacian.cotangent_energy),
     "biharmonic": DrivingMethod(laplacian.biharmonic_energy),
     "rbf-linear": DrivingMethod(kernel="linear"),

@@ -74,13 +74,13 @@ class KeyedPerformance:
         """For each target the part of the source that it follows, (G, T, d)."""
         return self.source.transpose(1, 0, 2) if self.by_point else self.frames[None]
 
-    def less(self, guess: FloatArray) -> KeyedPerformance:
-        """The same source, with what a guess (T, G, C) leaves of the key poses."""
-        return KeyedPerformance(self.source, self.keys, self.labels - guess[self.keys])
+    def less(self, estimate: FloatArray) -> KeyedPerformance:
+        """The same source, with what an estimate (T, G, C) leaves of the key poses."""
+        return KeyedPerformance(self.source, self.keys, self.labels - estimate[self.keys])
 
 
 def even_keys(frames: int, every: int) -> IntArray:
-    """Frames 0, `every`, 2 `every`, ... and the last one, which else would have to be guessed.
+    """Frames 0, `every`, 2 `every`, ... and the last one, after which no key follows.
 
     Raises
     ------

@@ -16,9 +16,9 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.topology.neighbourhoods import adjacency
 
 
-def uniform_energy(faces: IntArray, vertices: int) -> sparse.csc_array:
+def uniform_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:
     """Lᵀ L with L = I - D⁻¹ A: each vertex against the mean of its neighbours, (V, V)."""
-    return squared(random_walk(adjacency(faces, vertices)))
+    return squared(random_walk(adjacency(faces, len(vertices))))
 
 
 def cotangent_energy(vertices: FloatArray, faces: IntArray) -> sparse.csc_array:

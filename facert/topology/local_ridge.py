@@ -1,8 +1,8 @@
 """Regression of the target on the source, from the key frames alone.
 
-A few keys say little about a map from all feature points to all feature points. What they leave
-open is decided by three beliefs: the target moves as the scaled source does, a point follows those
-near it more than those far away, and the map is nearly linear. It is a kernel ridge regression,
+A few keys leave a map from all feature points to all feature points open. Three assumptions decide:
+the target moves as the scaled source does, a point follows those near it more than those far away,
+and the map is nearly linear. It is a kernel ridge regression,
 
     y_p(t) = s x_p(t) + c + k_p(t, keys) (k_p(keys, keys) + λ)⁻¹ (Ŷ_p - s X_p - c),
 
@@ -44,8 +44,8 @@ def local_ridge(take: KeyedPerformance) -> FloatArray:
     if not take.by_point:
         nothing = np.zeros((len(take), *take.labels.shape[1:]))
         return _kernel_ridge(take, nothing, np.ones((1, take.source.shape[1])))
-    guess = scaled_source(take)
-    return guess + _kernel_ridge(take, guess, _nearness(take.source.mean(axis=0)))
+    scaled = scaled_source(take)
+    return scaled + _kernel_ridge(take, scaled, _nearness(take.source.mean(axis=0)))
 
 
 def _nearness(rest: FloatArray) -> FloatArray:
@@ -55,9 +55,9 @@ def _nearness(rest: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-distance / REACH) + EVERYWHERE)
 
 
-def _kernel_ridge(take: KeyedPerformance, guess: FloatArray, weights: FloatArray) -> FloatArray:
-    """What a guess (T, G, C) leaves of the target, with weights w_pq (G, M), (T, G, C)."""
-    left = take.less(guess).labels
+def _kernel_ridge(take: KeyedPerformance, first: FloatArray, weights: FloatArray) -> FloatArray:
+    """What a first estimate (T, G, C) leaves of the target, with weights w_pq (G, M), (T, G, C)."""
+    left = take.less(first).labels
     mean = left.mean(axis=0)
     targets = (left - mean).transpose(1, 0, 2)
     centred = take.source - take.source[take.keys].mean(axis=0)
@@ -151,7 +151,7 @@ def _dual_weights(kernel: FloatArray, targets: FloatArray) -> tuple[FloatArray, 
 def _trusts(errors: FloatArray, keys: int) -> FloatArray:
     """Weights of regressions by their leave-one-out errors E, of the same shape, that sum to 1.
 
-    With few keys the errors are a rough guess: a regression has the weight E^(-K/10), which comes
+    With few keys the errors are rough: a regression has the weight E^(-K/10), which comes
     to a choice as the keys grow many.
     """
     least = errors.min()

@@ -80,8 +80,8 @@ def temporal_windows(frames: int, width: int) -> Neighbourhoods:
     return Neighbourhoods(frames, window[inside], inside.sum(axis=1))
 
 
-def mesh_rings(faces: IntArray, vertices: int, rings: int = 1) -> Neighbourhoods:
-    """Each vertex and those that at most `rings` edges lead to (Figure 4).
+def mesh_rings(faces: IntArray, vertices: int) -> Neighbourhoods:
+    """Each vertex and those that an edge leads to (Figure 4).
 
     Any triangles will do: edges of three faces, doubled and degenerate faces do no harm. A vertex
     that no face uses is alone.
@@ -91,16 +91,8 @@ def mesh_rings(faces: IntArray, vertices: int, rings: int = 1) -> Neighbourhoods
     faces : array of int, shape (F, 3)
     vertices : int
         V.
-    rings : int
-        At least 1.
     """
-    if rings < 1:
-        raise InputError("rings", "1 or more", f"{rings}", "One ring suits most meshes.")
-    step = adjacency(faces, vertices)
-    step = (step + sparse.eye_array(vertices, dtype=step.dtype)).tocsr()
-    reach = step
-    for _ in range(rings - 1):
-        reach = (reach @ step).tocsr()
+    reach = (adjacency(faces, vertices) + sparse.eye_array(vertices)).tocsr()
     reach.sort_indices()
     return Neighbourhoods(vertices, reach.indices.astype(np.int64), np.diff(reach.indptr))
 

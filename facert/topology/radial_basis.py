@@ -15,7 +15,8 @@ from scipy.spatial.distance import cdist, pdist
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
-from facert.topology.solution import Dense, one_thread
+from facert.models.threads import one_thread
+from facert.topology.solution import Dense
 
 Kernel = Literal["linear", "thin_plate_spline"]
 

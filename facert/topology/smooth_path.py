@@ -1,14 +1,14 @@
-"""What smoothness in time tells of the frames between the keys, and how far to trust it.
+"""The smoothest path in time through the key poses, and how far to trust it between them.
 
-The smoothest path through the key poses, ∫ ‖y''‖² dt = trace(Ŷᵀ S Ŷ) least, is Y = A Ŷ. As a belief
-about the target it is a Gaussian process, whose covariance between the keys is the pseudo-inverse
-S⁺, and A S⁺ between all frames and the keys.
+The smoothest path, ∫ ‖y''‖² dt = trace(Ŷᵀ S Ŷ) least, is Y = A Ŷ. As a prior of the target it is a
+Gaussian process, whose covariance between the keys is the pseudo-inverse S⁺, and A S⁺ between all
+frames and the keys.
 
-Whether the path can be trusted, the key poses do not say: to leave one out doubles the gap that the
-path must bridge. The source does, all frames of which are known. Where the path through its key
-frames misses little of it, as in a slow rise to an expression and back, time tells much of the
-target; in speech it tells nothing. And where the target follows the source linearly, the source
-tells all, and there is nothing left for time to tell.
+How far to trust the path cannot be learned from the key poses: to leave one out doubles the gap
+that the path must bridge. But of the source all frames are known. Where the path through its key
+frames misses little of it, as in a slow rise to an expression and back, the target follows such a
+path too; in speech it does not. And where the target follows the source linearly, nothing is left
+for the path to explain.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from scipy.interpolate import CubicSpline
 from facert.data.arrays import FloatArray, IntArray
 from facert.topology.keyed import KeyedPerformance
 
-MOST = 30.0  # τ where time tells all
+MOST = 30.0  # τ where the path misses nothing of the source
 BALANCE = 0.2  # times what a linear map misses: where time is trusted half as much
 STEEPNESS = 6
 RANK = 1e-15  # share of the largest stiffness: less is rounding
-FARTHEST = 1e13  # ratio beyond which time surely tells nothing
+FARTHEST = 1e13  # ratio beyond which τ is 0
 
 
 class SmoothPath:
@@ -59,7 +59,7 @@ class SmoothPath:
         self.stiffness: FloatArray = 2.0 * ends + product + product.T
 
     def covariance(self) -> FloatArray:
-        """Of all frames with the keys, (T, K), where no key differs from the mean of the keys.
+        """Covariance of all frames with the keys, (T, K), for paths less their mean over the keys.
 
         Rows add up to 0, so do the rows of the keys, and the mean variance of the keys is 1.
         """
@@ -85,8 +85,7 @@ def trust_in_path(by_path: float, by_map: float) -> float:
     by_path : float
         ε, what the path misses of the source.
     by_map : float
-        δ, what a linear map from the source misses of a key that is left out. Both are shares of
-        the motion.
+        δ, the leave-one-out error of a linear map from the source. Both are shares of the motion.
     """
     if by_map <= 0:
         return 0.0

@@ -10,17 +10,15 @@ has no unit. Points are rows here and columns in the paper.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
-from threadpoolctl import ThreadpoolController
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
+from facert.models.threads import one_thread
 
 SINGULAR = 1e-13
 """A pivot below this share of the largest diagonal entry is rounding."""
@@ -100,7 +98,7 @@ class _Factor:
     """A sparse factorisation of a symmetric positive definite matrix, and its solutions.
 
     SuperLU in symmetric mode: the diagonal makes good pivots, and minimum degree on A + Aᵀ keeps
-    the factors small.
+    the factors small. It asks BLAS for thousands of tiny products: one thread is quickest.
     """
 
     def __init__(self, A: sparse.csc_array, points: IntArray) -> None:
@@ -130,21 +128,6 @@ class _Factor:
             return right
         with one_thread():
             return np.asarray(self._lu.solve(np.asfortranarray(right)))
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """Run the block with one BLAS thread.
-
-    SuperLU asks BLAS for thousands of tiny products; on a busy machine, two threads at each have
-    been measured ten times slower than one.
-    """
-    limited: AbstractContextManager[object] = _controller().limit(limits=1)
-    return limited
-
-
-@cache
-def _controller() -> ThreadpoolController:
-    return ThreadpoolController()  # finding the loaded libraries takes milliseconds
 
 
 def _undetermined(point: int) -> InputError:

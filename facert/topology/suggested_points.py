@@ -1,15 +1,16 @@
-"""Feature points that serve driving best: where a rig's shapes are hardest to guess.
+"""Feature points that serve driving best: where a rig's shapes are hardest to predict.
 
 First some points on the rim, far from each other, since without them no method knows where the face
 ends. Then, one after the other, the vertex that the framework misses most over all shapes of the
-rig, guessing from the points so far. Lips, lids and brows come by themselves: they move most, and
+rig, predicted from the points so far. Lips, lids and brows come by themselves: they move most, and
 unlike what is around them.
 
 On a face whose halves are alike, a vertex comes with the one opposite to it, so that both sides
 are driven alike.
 
-A new point changes the guess by a multiple of one column of the Green's function, so that a partial
-Cholesky factorisation of it with these pivots is all that is needed: one sparse solution a point.
+A new point changes the prediction by a multiple of one column of the Green's function, so that a
+partial Cholesky factorisation of it with these pivots is all that is needed: one sparse solution a
+point.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.topology.driving import smooth_energy
@@ -75,10 +76,10 @@ def spread_vertices(rig: Rig, count: int) -> IntArray:
         if components[first] not in components[chosen]:
             choose(_with_opposite(int(first), mirror))
     while len(chosen) < count:
-        may = candidates[_fitting(mirror[candidates], candidates, count - len(chosen))]
-        if distance[may].max(initial=0.0) <= 0:
+        fitting = _fitting(candidates, mirror, count - len(chosen))
+        if distance[fitting].max(initial=0.0) <= 0:
             break
-        choose(_with_opposite(int(may[distance[may].argmax()]), mirror))
+        choose(_with_opposite(int(fitting[distance[fitting].argmax()]), mirror))
     return np.array(chosen, dtype=np.int64)
 
 
@@ -87,10 +88,10 @@ def _with_opposite(vertex: int, mirror: IntArray) -> list[int]:
     return list(dict.fromkeys([vertex, int(mirror[vertex])]))
 
 
-def _fitting(opposites: IntArray, vertices: IntArray, room: int) -> BoolArray:
-    """Which vertices fit, with their opposites, where so many may be chosen yet, (n,)."""
-    middle = opposites == vertices
-    return middle if room == 1 and middle.any() else np.full(len(vertices), True)
+def _fitting(vertices: IntArray, mirror: IntArray, room: int) -> IntArray:
+    """The vertices that fit with their opposites where `room` more may be chosen, if any do."""
+    middle = vertices[mirror[vertices] == vertices]
+    return middle if room == 1 and len(middle) else vertices
 
 
 def rim_vertices(faces: IntArray) -> IntArray:
@@ -101,40 +102,40 @@ def rim_vertices(faces: IntArray) -> IntArray:
 
 
 def _hardest(rig: Rig, given: IntArray, count: int) -> IntArray:
-    """The given vertices, then those that are missed most, guessed from all before, (count,)."""
-    guess = _Guess(rig, given)
+    """The given vertices, then those that are missed most, predicted from all before, (count,)."""
+    predicted = _PredictedShapes(rig, given)
     mirror, everywhere = mirror_vertices(rig.neutral), np.arange(len(rig.neutral))
     chosen = list(given)
     while len(chosen) < count:
-        fitting = _fitting(mirror, everywhere, count - len(chosen)) & ~np.isin(everywhere, chosen)
-        free = np.flatnonzero(fitting if fitting.any() else ~np.isin(everywhere, chosen))
-        pair = _with_opposite(int(free[guess.missed[free].argmax()]), mirror)
-        for vertex in pair[: count - len(chosen)]:
+        room = count - len(chosen)
+        fitting = _fitting(np.setdiff1d(everywhere, chosen), mirror, room)
+        hardest = int(fitting[predicted.squared_errors[fitting].argmax()])
+        for vertex in _with_opposite(hardest, mirror)[:room]:
             if vertex not in chosen:
-                guess.add(vertex)
+                predicted.add(vertex)
                 chosen.append(vertex)
     return np.array(chosen, dtype=np.int64)
 
 
-class _Guess:
-    """The shapes of a rig as the framework guesses them from some vertices, and what it misses."""
+class _PredictedShapes:
+    """The shapes of a rig as the framework predicts them from some vertices."""
 
     def __init__(self, rig: Rig, given: IntArray) -> None:
         energy = smooth_energy(rig.neutral, rig.faces)
         self._solution = Elimination(energy, checked_labels(given, len(rig.neutral)))
         shapes = _evened(rig.shapes)
-        self._error = shapes - self._solution(shapes[given])  # (V, 3 P)
+        self._errors = shapes - self._solution(shapes[given])  # (V, 3 P)
         self._factor = np.zeros((len(shapes), 0))
 
     @property
-    def missed(self) -> FloatArray:
-        """How much each vertex is missed, squared, (V,)."""
-        return np.asarray(np.einsum("vp,vp->v", self._error, self._error))
+    def squared_errors(self) -> FloatArray:
+        """How much each vertex is missed, (V,)."""
+        return np.asarray(np.einsum("vp,vp->v", self._errors, self._errors))
 
     def add(self, vertex: int) -> None:
-        """Guess from this vertex too."""
+        """Predict from this vertex too: a step of the Cholesky factorisation."""
         column = self._solution.green(vertex) - self._factor @ self._factor[vertex]
-        self._error -= np.outer(column / column[vertex], self._error[vertex])
+        self._errors -= np.outer(column / column[vertex], self._errors[vertex])
         self._factor = np.column_stack([self._factor, column / np.sqrt(column[vertex])])
 
 

@@ -7,7 +7,7 @@ from facert.topology import laplacian
 def test_energies_are_symmetric_semidefinite_and_blind_to_constants(sheet):
     points, faces = sheet
     for energy in (
-        laplacian.uniform_energy(faces, 72),
+        laplacian.uniform_energy(points, faces),
         laplacian.cotangent_energy(points, faces),
         laplacian.biharmonic_energy(points, faces),
         laplacian.path_energy(30),
