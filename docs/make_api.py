@@ -16,9 +16,9 @@ PAGE = Path(__file__).parent / "api.md"
 
 HEAD = """# API
 
-`import facert` is enough for all that has no module in its name. What a public function takes or
-returns beside these follows under [Others](#others). Every error that facert raises on purpose is a
-`FacertError`; one line tells what was expected, what was found, and what to do.
+`import facert` is enough for every name here without a module. The other classes that public functions
+take or return follow under [Others](#others). Every error that facert raises on purpose is a
+`FacertError`, whose one line gives what was expected, what was found, and what to do.
 
 This page is written by `make docs`, from the docstrings.
 """
@@ -83,7 +83,7 @@ def _members(thing: type) -> list[str]:
 
 
 def _entry(level: str, name: str, thing: Any) -> str:
-    """A heading, how it is called, and what its docstring says."""
+    """A heading, the call, and the docstring."""
     heading = f"{level} `{name}`\n"
     call = _signature(name.rsplit(".", 1)[-1], thing)
     code = f"```py\n{call}\n```\n" if call else ""
@@ -141,8 +141,8 @@ def _items(body: str) -> Iterator[str]:
         head, *lines = item.split("\n")
         name, _, kind = head.partition(" : ")
         names = ", ".join(f"`{one}`" for one in name.split(", ")) if kind else name
-        said = " ".join(line.strip() for line in lines if line.strip())
-        yield "* " + names + (f" ({kind})" if kind else "") + (f": {said}" if said else "")
+        text = " ".join(line.strip() for line in lines if line.strip())
+        yield "* " + names + (f" ({kind})" if kind else "") + (f": {text}" if text else "")
 
 
 if __name__ == "__main__":

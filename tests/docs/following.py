@@ -29,7 +29,7 @@ _BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 @dataclass(frozen=True)
 class Block:
-    """What stands between two fences of a page, and what the first says of it.
+    """The text between two fences of a page, and the language and name on the first.
 
     Commands have no language; `sh` has commands that end with Ctrl-C, of which the options are
     checked; `bash` what makes an installation; `text` what the commands before it print; `python` a
@@ -53,7 +53,7 @@ def blocks_of(page: Path) -> list[Block]:
 
 
 def follow(page: Path, folder: Path) -> None:
-    """Do what a page says, in a folder; its commands succeed and print what it shows.
+    """Follow a page in a folder: its commands succeed and print what it shows.
 
     Where it exists already, the folder that the page makes stand-ins in keeps what it holds.
     """

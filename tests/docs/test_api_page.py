@@ -1,4 +1,4 @@
-"""The API page says what the docstrings say."""
+"""The API page is that of the docstrings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A reader who does what the guides say gets what they show."""
+"""A reader who follows the guides gets what they show."""
 
 from __future__ import annotations
 
