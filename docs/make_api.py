@@ -17,8 +17,8 @@ PAGE = Path(__file__).parent / "api.md"
 HEAD = """# API
 
 `import facert` is enough for every name here without a module. The other classes that public
-functions take or return follow under [Others](#others). Every error that facert raises on purpose is a
-`FacertError`, whose one line gives what was expected, what was found, and what to do.
+functions take or return follow under [Others](#others). Every error that facert raises on purpose
+is a `FacertError`, whose one line gives what was expected, what was found, and what to do.
 
 This page is written by `make docs`, from the docstrings.
 """
