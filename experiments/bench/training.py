@@ -15,7 +15,7 @@ from experiments.bench.problem import bench_data
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.methods.base import Labelled, Report
+from facert.methods.base import Labelled, Report, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import make_method
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
@@ -69,6 +69,7 @@ def another_label(settings: Settings) -> Call:
 
     def call() -> Report:
         method = make_method(before.settings)
+        assert isinstance(method, WarmStart)
         method.begin_at(before, *same)
         return method.fit(labelled, unlabelled)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Self
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Annotated, Self, get_origin, get_type_hints
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
@@ -16,9 +17,9 @@ DAMAGED = "The model file is damaged: train it again."
 class ArrayGroup:
     """Arrays that were learned together; a field may be a group of such arrays itself.
 
-    `axes` spells the shape of each array, a letter an axis. A letter stands for one size in all of
-    them ("x" for d_x, "y" for d_y), a digit for itself: ``{"weights": "xy", "offset": "y"}``.
-    `parts` has the type of each field that is a group.
+    The type of an array spells its shape, a letter an axis. A letter stands for one size in all of
+    them ("x" for d_x, "y" for d_y), a digit for itself: ``weights: Annotated[FloatArray, "xy"]``.
+    Where a file has another name for a field, it follows: ``Annotated[FloatArray, "y", "offset"]``.
 
     Raises
     ------
@@ -26,37 +27,51 @@ class ArrayGroup:
         When the arrays do not fit together.
     """
 
-    axes: ClassVar[Mapping[str, str]]
-    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {}
-
     def __post_init__(self) -> None:
         check_axes(self.arrays, self.all_axes())
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """Every array by its name, those of a part as ``part.name``."""
-        own = {name: getattr(self, name) for name in self.axes}
+        """Every array by its name in files, those of a group as ``group.name``."""
+        arrays, groups = self._spelled()
+        own = {stored: getattr(self, name) for name, (_, stored) in arrays.items()}
         return own | {
-            f"{part}.{name}": array
-            for part in self.parts
-            for name, array in getattr(self, part).arrays.items()
+            f"{group}.{name}": array
+            for group in groups
+            for name, array in getattr(self, group).arrays.items()
         }
 
     @classmethod
     def all_axes(cls) -> dict[str, str]:
-        """The shape of every array."""
-        return dict(cls.axes) | {
-            f"{part}.{name}": letters
-            for part, group in cls.parts.items()
-            for name, letters in group.all_axes().items()
+        """The shape of every array, by the names of `arrays`."""
+        arrays, groups = cls._spelled()
+        return {stored: letters for letters, stored in arrays.values()} | {
+            f"{name}.{inner}": letters
+            for name, group in groups.items()
+            for inner, letters in group.all_axes().items()
         }
 
     @classmethod
     def of(cls, arrays: Mapping[str, FloatArray], prefix: str = "") -> Self:
-        """The group of these arrays, named as `arrays` names them."""
-        own = {name: arrays[prefix + name] for name in cls.axes}
-        groups = {name: part.of(arrays, f"{prefix}{name}.") for name, part in cls.parts.items()}
-        return cls(**own, **groups)
+        """The group whose `arrays` these are, after a prefix."""
+        own, groups = cls._spelled()
+        return cls(
+            **{name: arrays[prefix + stored] for name, (_, stored) in own.items()},
+            **{name: group.of(arrays, f"{prefix}{name}.") for name, group in groups.items()},
+        )
+
+    @classmethod
+    @cache
+    def _spelled(cls) -> tuple[dict[str, tuple[str, str]], dict[str, type[ArrayGroup]]]:
+        """Shape and stored name of each field that is an array, and the type of each group."""
+        hints = get_type_hints(cls, include_extras=True)
+        types = {field.name: hints[field.name] for field in fields(cls)}
+        arrays = {
+            name: (kind.__metadata__[0], kind.__metadata__[-1] if kind.__metadata__[1:] else name)
+            for name, kind in types.items()
+            if get_origin(kind) is Annotated
+        }
+        return arrays, {name: kind for name, kind in types.items() if name not in arrays}
 
 
 def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dict[str, int]:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
@@ -36,6 +38,16 @@ class Unlabelled:
     X: FloatArray
     Y: FloatArray
     bounds: FloatArray | None = None
+
+    @property
+    def counts(self) -> dict[str, float]:
+        """How many there are of each, as figures of a report."""
+        return {"unlabelled frames": len(self.X), "unlabelled poses": len(self.Y)}
+
+
+def stacked(labelled: Labelled, unlabelled: Unlabelled) -> tuple[FloatArray, FloatArray]:
+    """All frames (l + m, d_x) and all poses (l + n, d_y), the labelled ones first."""
+    return np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
 
 
 @dataclass(frozen=True)
@@ -101,20 +113,6 @@ class Method(Protocol):
         """d_x and d_y of what it was trained on."""
         ...
 
-    def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
-        """Let `fit` begin at what a method of the same settings has learned.
-
-        One that learns in one go begins anew: it depends on the data alone.
-
-        Parameters
-        ----------
-        other : Method
-            Trained.
-        source, target : Normalisation
-            The units that `fit` will be given, in those that the other was.
-        """
-        ...
-
     def fit(self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...) -> Report:
         """Learn from labelled frames and whatever unlabelled data the method can use."""
         ...
@@ -153,4 +151,21 @@ class Method(Protocol):
 
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned; raises InputError when shapes do not fit together."""
+        ...
+
+
+@runtime_checkable
+class WarmStart(Protocol):
+    """A method that trains step by step, and may begin at a trained one."""
+
+    def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
+        """Let `fit` begin at what a method of the same settings has learned.
+
+        Parameters
+        ----------
+        other : Method
+            Trained.
+        source, target : Normalisation
+            The units that `fit` will be given, in those that the other was.
+        """
         ...

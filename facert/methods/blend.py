@@ -7,31 +7,30 @@ Gaussian process on the markers as they are is. `auto` has four experts:
 1. a Gaussian process with a linear term, on the source as it is;
 2. the same on half-whitened features;
 3. the factors, shrunk towards likely poses;
-4. the factors and what a Gaussian process on half-whitened features tells of their errors at
-   labels that they had not seen, shrunk likewise.
+4. the factors plus a Gaussian process on half-whitened features that predicts their residual,
+   learned from their cross-validated errors, shrunk likewise.
 
-With P_e (l, d_y) what expert e says of labels left out, clipped to the limits of the poses, the
-weights minimise
+With P_e (l, d_y) the poses that expert e predicts for labels in cross-validation, clipped to the
+limits of the poses, the weights minimise
 
     |Σ_e w_e P_e - Y|² + ρ E |w|²,      w_e >= 0,      Σ_e w_e = 1,
 
-E the least squared error of one expert: few labels say little about which expert is best, and ρ
+E the least squared error of one expert: few labels hardly determine which expert is best, and ρ
 then keeps the weights together (Breiman 1996, Stacked Regressions).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import nnls
 
-from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray, rms
-from facert.methods.base import Labelled, Report, Unlabelled
+from facert.methods.base import Labelled, Report, Unlabelled, stacked
 from facert.methods.factors import FactorMap
 from facert.methods.folds import ranked_folds
 from facert.methods.processes import Basis, FeatureProcess, ProcessBank
@@ -60,30 +59,20 @@ class BlendMap(Map):
     weights : array, shape (4,)
     range : array, shape (2, d_y)
         What every expert is clipped to.
-    doubt : array, shape (d_y,)
-        How far off the shrunk factors were at labels left out, root mean square. Their own spread
-        is that of free poses, and knows nothing of how well the labels fix them.
+    factor_error : array, shape (d_y,)
+        Cross-validation error of the shrunk factors, root mean square. Their own spread is that of
+        free poses, and does not depend on how well the labels fix them.
     plain, whitened : FeatureProcess
     factors : FactorMap
     residual : FeatureProcess
-        What the factors miss.
+        Predicts the factors' error.
     shrinkage, residual_shrinkage : Shrinkage
-        Of the factors without and with that.
+        Of the factors without and with the residual.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"weights": "4", "range": "2y", "doubt": "y"}
-    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {
-        "plain": FeatureProcess,
-        "whitened": FeatureProcess,
-        "factors": FactorMap,
-        "residual": FeatureProcess,
-        "shrinkage": Shrinkage,
-        "residual_shrinkage": Shrinkage,
-    }
-
-    weights: FloatArray
-    range: FloatArray
-    doubt: FloatArray
+    weights: Annotated[FloatArray, "4"]
+    range: Annotated[FloatArray, "2y"]
+    factor_error: Annotated[FloatArray, "y", "doubt"]
     plain: FeatureProcess
     whitened: FeatureProcess
     factors: FactorMap
@@ -110,7 +99,7 @@ class BlendMap(Map):
     def _variance(self, of_processes: FloatArray) -> FloatArray:
         """Variance of poses (T, d_y), from that of the processes in the bank, (p, T)."""
         shares = np.delete(self._used, -2)
-        return np.asarray((shares @ of_processes)[:, None] + self.weights[2] * self.doubt**2)
+        return np.asarray((shares @ of_processes)[:, None] + self.weights[2] * self.factor_error**2)
 
     @cached_property
     def _direct(self) -> Sequence[int]:
@@ -160,8 +149,8 @@ class BaseMaps:
     @classmethod
     def learn(cls, labelled: Labelled, unlabelled: Unlabelled) -> BaseMaps:
         """The maps of labelled frames, frames and poses."""
-        frames = np.vstack([labelled.X, unlabelled.X])
-        mean = np.vstack([labelled.Y, unlabelled.Y]).mean(axis=0)
+        frames, poses = stacked(labelled, unlabelled)
+        mean = poses.mean(axis=0)
         plain = FeatureProcess.learn(labelled, Basis.plain(frames), mean)
         whitened = FeatureProcess.learn(labelled, Basis.half_whitened(frames), mean)
         guess = (plain(unlabelled.X)[0] + whitened(unlabelled.X)[0]) / 2.0
@@ -193,25 +182,25 @@ class Auto(Regression):
     map_type = BlendMap
 
     def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[BlendMap, Report]:
-        poses, Y = np.vstack([labelled.Y, unlabelled.Y]), labelled.Y
+        _, poses = stacked(labelled, unlabelled)
         bounds = _bounds(unlabelled, poses)
         some = _fewer_poses(unlabelled, self.settings.seed)
         maps = BaseMaps.learn(labelled, some)
         plain, whitened, factors = np.clip(cross_validated_poses(labelled, some), *bounds)
 
-        basis = Basis(maps.whitened.centre, maps.whitened.basis)
-        missed = Labelled(labelled.X, Y - factors)
-        residual = FeatureProcess.learn(missed, basis, np.zeros(Y.shape[1]))
+        Y, basis = labelled.Y, Basis(maps.whitened.centre, maps.whitened.basis)
+        left = Labelled(labelled.X, Y - factors)
+        residual = FeatureProcess.learn(left, basis, np.zeros(Y.shape[1]))
         corrected = np.clip(Y - residual.process.leave_one_out_errors, *bounds)
         shrinkage = Shrinkage.learn(poses, Y - factors)
         residual_shrinkage = Shrinkage.learn(poses, Y - corrected)
-        said = [plain, whitened, shrinkage(factors), residual_shrinkage(corrected)]
-        errors = [Y - np.clip(p, *bounds) for p in said]
+        predicted = [plain, whitened, shrinkage(factors), residual_shrinkage(corrected)]
+        errors = [Y - np.clip(poses, *bounds) for poses in predicted]
         weights = blend_weights(errors)
         made = BlendMap(
             weights=weights,
             range=bounds,
-            doubt=np.sqrt(np.mean(errors[EXPERTS.index("factors")] ** 2, axis=0)),
+            factor_error=np.sqrt(np.mean(errors[EXPERTS.index("factors")] ** 2, axis=0)),
             plain=maps.plain,
             whitened=maps.whitened,
             factors=maps.factors,
@@ -219,16 +208,15 @@ class Auto(Regression):
             shrinkage=shrinkage,
             residual_shrinkage=residual_shrinkage,
         )
-        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
         shares = {f"weight of {n}": float(w) for n, w in zip(EXPERTS, weights, strict=True)}
         error = rms(np.tensordot(weights, np.array(errors), axes=1))
         return made, Report(
-            figures={**counts, **shares}, pose_figures={"cross-validation error": error}
+            figures={**unlabelled.counts, **shares}, pose_figures={"cross-validation error": error}
         )
 
 
 def _bounds(unlabelled: Unlabelled, poses: FloatArray) -> FloatArray:
-    """What poses are clipped to, (2, d_y), finite."""
+    """The finite limits that poses are clipped to, (2, d_y)."""
     if unlabelled.bounds is None:
         return np.stack([poses.min(axis=0), poses.max(axis=0)])
     return np.clip(unlabelled.bounds, -UNBOUNDED, UNBOUNDED)
@@ -243,11 +231,11 @@ def _fewer_poses(unlabelled: Unlabelled, seed: int) -> Unlabelled:
 
 
 def blend_weights(errors: Sequence[FloatArray]) -> FloatArray:
-    """The weights of experts, (e,), from what each missed every label by, (l, d_y) each."""
+    """The weights of experts, (e,), from their errors at every label, (l, d_y) each."""
     flat = np.stack([error.ravel() for error in errors])
     gram = flat @ flat.T
     squares = gram.diagonal()
-    # An expert may miss nothing: clipped, or where nothing moves.
+    # An expert may make no error: clipped, or where nothing moves.
     least = max(squares.min(), FAULTLESS * squares.max(), np.finfo(np.float64).tiny)
     Q = gram / least + TOGETHER * np.eye(len(flat))
     # The quadratic form is homogeneous: without the sum, min v'Qv/2 - 1'v over v >= 0 has the same

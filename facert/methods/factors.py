@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.methods.base import Labelled, Unlabelled
+from facert.methods.base import Labelled, Unlabelled, stacked
 from facert.methods.regression import Map, Variance
 from facert.models.factors.censoring import ClippedMean, Limits
 from facert.models.factors.model import Evidence, learn_factors
@@ -35,21 +34,12 @@ class FactorMap(Map):
         Lower and upper limits, and 1 where poses pile up there, else 0.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {
-        "centre": "x",
-        "weights": "xy",
-        "offset": "y",
-        "spread": "y",
-        "limits": "2y",
-        "censored": "2y",
-    }
-
-    centre: FloatArray
-    weights: FloatArray
-    offset: FloatArray
-    spread: FloatArray
-    limits: FloatArray
-    censored: FloatArray
+    centre: Annotated[FloatArray, "x"]
+    weights: Annotated[FloatArray, "xy"]
+    offset: Annotated[FloatArray, "y"]
+    spread: Annotated[FloatArray, "y"]
+    limits: Annotated[FloatArray, "2y"]
+    censored: Annotated[FloatArray, "2y"]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,8 +56,7 @@ class FactorMap(Map):
         guess : array, shape (m, d_y)
             Poses of the frames without one, at which the search begins.
         """
-        frames = np.vstack([labelled.X, unlabelled.X])
-        poses = np.vstack([labelled.Y, unlabelled.Y])
+        frames, poses = stacked(labelled, unlabelled)
         centre, mean, limits = frames.mean(axis=0), poses.mean(axis=0), Limits.of(poses)
         evidence = Evidence(
             labelled.X - centre,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
@@ -14,7 +13,7 @@ from scipy.spatial.distance import cdist
 from facert.data.arrays import FloatArray
 from facert.methods.regression import Map, SupervisedRegression
 
-# Enough to tell a frame that was posed twice, differently, from a contradiction.
+# Enough for a frame that was posed twice, differently, to be no contradiction.
 SMOOTHING = 1e-3
 
 
@@ -31,11 +30,10 @@ class InterpolatingMap(Map):
     """
 
     predicts_std: ClassVar[bool] = False
-    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "smoothing": "1"}
 
-    X: FloatArray
-    Y: FloatArray
-    smoothing: FloatArray
+    X: Annotated[FloatArray, "nx"]
+    Y: Annotated[FloatArray, "ny"]
+    smoothing: Annotated[FloatArray, "1"]
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
@@ -72,10 +70,9 @@ class NearestMap(Map):
     """
 
     predicts_std: ClassVar[bool] = False
-    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny"}
 
-    X: FloatArray
-    Y: FloatArray
+    X: Annotated[FloatArray, "nx"]
+    Y: Annotated[FloatArray, "ny"]
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""

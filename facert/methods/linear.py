@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from sklearn.cross_decomposition import PLSRegression
@@ -33,10 +32,9 @@ class LinearMap(Map):
     """
 
     predicts_std: ClassVar[bool] = False
-    axes: ClassVar[Mapping[str, str]] = {"weights": "xy", "offset": "y"}
 
-    weights: FloatArray
-    offset: FloatArray
+    weights: Annotated[FloatArray, "xy"]
+    offset: Annotated[FloatArray, "y"]
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
@@ -81,7 +79,7 @@ class PLS(SupervisedRegression):
 
 
 def _poses_by_components(X: FloatArray, Y: FloatArray, frames: FloatArray, most: int) -> FloatArray:
-    """What 1 to `most` components say about frames (T, d_x), (most, T, d_y).
+    """Poses of frames (T, d_x) by 1 to `most` components, (most, T, d_y).
 
     Components are found one after the other: each model is the next with its last term left off.
     """

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, ArrayGroup
+from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Labelled
@@ -37,11 +37,9 @@ class ProcessMap(Map):
         θ1, θ2, θ3 and θ4 of `facert.models.gp.hyperparameters`; θ1 or θ4 may be 0.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"X": "nx", "Y": "ny", "theta": "4"}
-
-    X: FloatArray
-    Y: FloatArray
-    theta: FloatArray
+    X: Annotated[FloatArray, "nx"]
+    Y: Annotated[FloatArray, "ny"]
+    theta: Annotated[FloatArray, "4"]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -95,12 +93,9 @@ class FeatureProcess(Map):
         From features to poses less their mean.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"centre": "x", "basis": "xx", "mean": "y"}
-    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {"process": ProcessMap}
-
-    centre: FloatArray
-    basis: FloatArray
-    mean: FloatArray
+    centre: Annotated[FloatArray, "x"]
+    basis: Annotated[FloatArray, "xx"]
+    mean: Annotated[FloatArray, "y"]
     process: ProcessMap
 
     @classmethod

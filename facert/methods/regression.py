@@ -17,9 +17,8 @@ import numpy as np
 
 from facert.data.array_group import DAMAGED, ArrayGroup, check_axes
 from facert.data.arrays import FloatArray, rms
-from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled, stacked
 from facert.models.device import find_device
 from facert.models.gaussian import Gaussian
 from facert.models.optim.monitor import Monitor
@@ -77,15 +76,6 @@ class Regression(ABC):
         sizes = check_axes(self.map_.arrays, self.map_.all_axes())
         return sizes["x"], sizes["y"]
 
-    def begin_at(  # the search is soon over, and so depends on the data alone
-        self,
-        other: Method,  # noqa: ARG002
-        source: Normalisation,  # noqa: ARG002
-        target: Normalisation,  # noqa: ARG002
-    ) -> None:
-        """Nothing to do; see `Method.begin_at`."""
-        log.info("%s learns in one go, and begins anew", self.settings.method)
-
     def fit(
         self,
         labelled: Labelled,
@@ -118,7 +108,7 @@ class Regression(ABC):
                 "Pose more frames (10 to 40 serve well).",
             )
         with threads_for(count):
-            frames = np.vstack([labelled.X, unlabelled.X])
+            frames, _ = stacked(labelled, unlabelled)
             self.gaps_ = Gaussian.of(frames)
             self.map_, report = self._learn(labelled, unlabelled)
             self.response_ = self._linear_response(frames)

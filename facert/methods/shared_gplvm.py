@@ -23,7 +23,7 @@ from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled, stacked
 from facert.methods.noise import with_noise
 from facert.methods.views import view_arrays, view_from
 from facert.models.device import find_device
@@ -85,7 +85,7 @@ class SemiSupervisedSGPLVM:
         return self.source_.columns, self.target_.columns
 
     def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
-        """Let `fit` begin at the latents and kernels of a trained model; see `Method.begin_at`."""
+        """Let `fit` begin at latents and kernels of a trained model; see `WarmStart.begin_at`."""
         assert isinstance(other, SemiSupervisedSGPLVM)
         self._begin = Start(other.source_, other.target_, source, target)
 
@@ -101,7 +101,7 @@ class SemiSupervisedSGPLVM:
         monitor : Monitor, optional
             Watches the iterations and keeps checkpoints.
         """
-        X, Y = np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
+        X, Y = stacked(labelled, unlabelled)
         count = len(labelled.X)
         self.settings = with_noise(self._given, X)
         device = find_device(self.settings.device)
@@ -278,11 +278,7 @@ class SemiSupervisedSGPLVM:
         )
 
     def _figures(self, unlabelled: Unlabelled) -> dict[str, float]:
-        figures: dict[str, float] = {
-            "unlabelled frames": len(unlabelled.X),
-            "unlabelled poses": len(unlabelled.Y),
-            "sigma_c": self.settings.sigma_c or math.nan,
-        }
+        figures = {**unlabelled.counts, "sigma_c": self.settings.sigma_c or math.nan}
         for view, posterior in (("source", self.source_), ("target", self.target_)):
             for index, value in enumerate(posterior.kernel.theta, start=1):
                 figures[f"{view} theta{index}"] = value

@@ -1,23 +1,20 @@
 """Shrinkage of predictions towards likely poses.
 
-Of the poses, the labels tell a regression f from the source; the others tell which poses are likely
-at all. Let ȳ and C be mean and covariance of all poses, and let R hold the mean squared error of f
-for each control, as found by leaving each label out. To a prediction p = y + e with e ~ N(0, R),
-the most probable pose under y ~ N(ȳ, C) is
+Poses with a frame determine a regression f from the source; all poses show which are likely at all.
+Let ȳ and C be their mean and covariance, and let R hold the mean squared error of f for each
+control in cross-validation. To a prediction p = y + e with e ~ N(0, R), the most probable pose
+under y ~ N(ȳ, C) is
 
     y = ȳ + C (C + R)⁻¹ (p - ȳ):
 
-controls that f predicts badly are told by those that it predicts well. The leave-one-out errors of
-a Gaussian process are known in closed form, (K⁻¹Y)_i / (K⁻¹)_ii (Rasmussen and Williams 2006, Eq.
-5.12).
+controls that f predicts badly follow from those that it predicts well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -30,7 +27,7 @@ RIDGE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Shrinkage(ArrayGroup):
-    """What takes a predicted pose to a likely one.
+    """The linear map from predicted poses to likely ones.
 
     Parameters
     ----------
@@ -40,14 +37,12 @@ class Shrinkage(ArrayGroup):
         (C + R)⁻¹ C, to be applied to rows.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"mean": "y", "matrix": "yy"}
-
-    mean: FloatArray
-    matrix: FloatArray
+    mean: Annotated[FloatArray, "y"]
+    matrix: Annotated[FloatArray, "yy"]
 
     @classmethod
     def learn(cls, poses: FloatArray, errors: FloatArray) -> Shrinkage:
-        """From all poses that are known, (n, d_y), and the errors at labels left out, (l, d_y)."""
+        """From all known poses (n, d_y), and the cross-validated errors at the labels, (l, d_y)."""
         C = np.atleast_2d(np.cov(poses, rowvar=False, bias=True))
         # Poses that are all the same have no variance at all.
         ridge = max(RIDGE * float(np.trace(C)) / len(C), np.finfo(np.float64).tiny)

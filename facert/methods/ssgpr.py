@@ -7,15 +7,10 @@ features; the poses show which predictions are likely, see `facert.methods.shrin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
-import numpy as np
-
-from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray
-from facert.methods.base import Labelled, Report, Unlabelled
+from facert.methods.base import Labelled, Report, Unlabelled, stacked
 from facert.methods.processes import Basis, FeatureProcess
 from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
@@ -24,12 +19,6 @@ from facert.methods.shrinkage import Shrinkage
 @dataclass(frozen=True, eq=False)
 class ShrunkProcess(Map):
     """A process whose poses are shrunk towards likely ones."""
-
-    axes: ClassVar[Mapping[str, str]] = {}
-    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {
-        "process": FeatureProcess,
-        "shrinkage": Shrinkage,
-    }
 
     process: FeatureProcess
     shrinkage: Shrinkage
@@ -46,9 +35,7 @@ class SemiSupervisedGPR(Regression):
     map_type = ShrunkProcess
 
     def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[ShrunkProcess, Report]:
-        frames = np.vstack([labelled.X, unlabelled.X])
-        poses = np.vstack([labelled.Y, unlabelled.Y])
+        frames, poses = stacked(labelled, unlabelled)
         process = FeatureProcess.learn(labelled, Basis.half_whitened(frames), poses.mean(axis=0))
         shrinkage = Shrinkage.learn(poses, process.process.leave_one_out_errors)
-        counts = {"unlabelled frames": len(unlabelled.X), "unlabelled poses": len(unlabelled.Y)}
-        return ShrunkProcess(process, shrinkage), Report(figures=counts)
+        return ShrunkProcess(process, shrinkage), Report(figures=unlabelled.counts)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import sklearn
@@ -15,6 +14,7 @@ from sklearn import svm
 from facert.data.arrays import FloatArray, IntArray
 from facert.methods.folds import blocked_folds
 from facert.methods.regression import Map, SupervisedRegression
+from facert.models.kernels import squared_exponential
 
 # The inverse width is relative to the mean squared distance of two labels; ε and C to the standard
 # deviation of a control.
@@ -40,22 +40,16 @@ class PackedMap(Map):
     """
 
     predicts_std: ClassVar[bool] = False
-    axes: ClassVar[Mapping[str, str]] = {
-        "X": "nx",
-        "inverse_widths": "g",
-        "duals": "gny",
-        "offset": "y",
-    }
 
-    X: FloatArray
-    inverse_widths: FloatArray
-    duals: FloatArray
-    offset: FloatArray
+    X: Annotated[FloatArray, "nx"]
+    inverse_widths: Annotated[FloatArray, "g"]
+    duals: Annotated[FloatArray, "gny"]
+    offset: Annotated[FloatArray, "y"]
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
-        squared = cdist(X, self.X, "sqeuclidean")
-        k = np.exp(-self.inverse_widths[:, None] * squared[:, None, :])
+        squared = cdist(X, self.X, "sqeuclidean")[:, None, :]
+        k = squared_exponential(squared, 1.0, 2.0 * self.inverse_widths[:, None])
         packed = self.duals.reshape(-1, self.duals.shape[2])
         return k.reshape(len(X), len(packed)) @ packed + self.offset, None
 
@@ -87,7 +81,7 @@ class SVR(SupervisedRegression):
         squared = cdist(X, X, "sqeuclidean")
         # Labels that are all the same have no width of their own.
         inverse_widths = np.array(INVERSE_WIDTHS) / (float(squared.mean()) or 1.0)
-        kernels = np.exp(-inverse_widths[:, None, None] * squared)
+        kernels = squared_exponential(squared, 1.0, 2.0 * inverse_widths[:, None, None])
         mean, scale = Y.mean(axis=0), Y.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)  # a control that never moves
         T = (Y - mean) / scale

@@ -11,7 +11,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import Regions
-from facert.methods.base import Labelled, Method, Report, Unlabelled
+from facert.methods.base import Labelled, Method, Report, Unlabelled, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
@@ -124,6 +124,7 @@ def _begin(
     if other is not None:
         log.warning("training begins anew: the start has another %s", other)
         return
+    assert isinstance(method, WarmStart)
     method.begin_at(
         start.method,
         source_units.seen_from(start.source_units),

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import MOST
 from facert.errors import InputError
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled
+from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled, WarmStart
 from facert.methods.registry import make_method
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
@@ -51,17 +51,10 @@ class RegionLayout(ArrayGroup):
         σ_c and the noise floor of the source, in the region's units.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {
-        "columns": "rx",
-        "weights": "ry",
-        "units": "r2",
-        "noise": "r2",
-    }
-
-    columns: FloatArray
-    weights: FloatArray
-    units: FloatArray
-    noise: FloatArray
+    columns: Annotated[FloatArray, "rx"]
+    weights: Annotated[FloatArray, "ry"]
+    units: Annotated[FloatArray, "r2"]
+    noise: Annotated[FloatArray, "r2"]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -110,6 +103,7 @@ class _RegionMethod:
 
     def begin_at(self, old: _RegionMethod, source: Normalisation, target: Normalisation) -> None:
         """Of the units, given for the face, only what the region sees and moves counts."""
+        assert isinstance(self.method, WarmStart)
         self.method.begin_at(
             old.method,
             _of_region(source, self.columns, old.source_unit, self.source_unit),
@@ -150,7 +144,7 @@ class Regional:
         return self.layout_.columns.shape[1], self.layout_.weights.shape[1]
 
     def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
-        """Let each region begin at its own; see `Method.begin_at`."""
+        """Let each region begin at its own; see `WarmStart.begin_at`."""
         assert isinstance(other, Regional)
         for part, old in zip(self.parts_, other.parts_, strict=True):
             part.begin_at(old, source, target)

@@ -8,9 +8,8 @@ columns, estimated through the same gaps, needs far more frames.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -39,11 +38,9 @@ class Factors(ArrayGroup):
         Variance of e.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"mean": "x", "weights": "xq", "noise": "x"}
-
-    mean: FloatArray
-    weights: FloatArray
-    noise: FloatArray
+    mean: Annotated[FloatArray, "x"]
+    weights: Annotated[FloatArray, "xq"]
+    noise: Annotated[FloatArray, "x"]
 
     @classmethod
     def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> Factors:

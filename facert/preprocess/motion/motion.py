@@ -7,9 +7,8 @@ one sight of a marker and the next.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -53,14 +52,11 @@ class Motion(ArrayGroup):
         capture noise.
     """
 
-    axes: ClassVar[Mapping[str, str]] = {"rates": "q", "rest": "x", "rest_rates": "x", "clock": "2"}
-    parts: ClassVar[Mapping[str, type[ArrayGroup]]] = {"factors": Factors}
-
     factors: Factors
-    rates: FloatArray
-    rest: FloatArray
-    rest_rates: FloatArray
-    clock: FloatArray
+    rates: Annotated[FloatArray, "q"]
+    rest: Annotated[FloatArray, "x"]
+    rest_rates: Annotated[FloatArray, "x"]
+    clock: Annotated[FloatArray, "2"]
 
     @property
     def sigma(self) -> float:
