@@ -71,7 +71,7 @@ class PosePage(PlayedPage):
     def stop(self) -> None:
         """End what is under way."""
         self.slow.stop()
-        self.worker.stop()
+        super().stop()
 
     def pin(self, control: int, value: float) -> None:
         """Hold a control; the others follow."""

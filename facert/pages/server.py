@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import socket
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
@@ -72,20 +70,6 @@ def show_errors(server: ViserServer) -> Callable[[str], None]:
             client.add_notification("This did not work", text, color="red")
 
     return show
-
-
-def wait_for_interrupt() -> None:
-    """Return at Ctrl-C, or when asked to end; a shell in the background ignores the former."""
-    asked = threading.Event()
-    before = {
-        one: signal.signal(one, lambda *_: asked.set()) for one in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        while not asked.wait(3600.0):
-            pass
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
 
 
 def _require_address(host: str, port: int) -> None:

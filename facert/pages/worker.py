@@ -150,6 +150,10 @@ class PlayedPage(ABC):
         self._clock = time.perf_counter()
         self.worker = Worker(show_errors(self._server), self._tick)
 
+    def stop(self) -> None:
+        """End what is under way."""
+        self.worker.stop()
+
     def seek(self, frame: int) -> None:
         """Go to a frame."""
         self.worker.do("seek", lambda: self._go(frame))

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.interrupt import interruptible
 from facert.cli.shared.options import (
     AS_JSON,
     CONTROLS,
@@ -137,7 +135,7 @@ def command(
             mapper = LiveModel(file, retargeter, pattern, receiver.fps, options, neutral)
             stack.enter_context(mapper)
         session = LiveSession(receiver, mapper, senders, files, kept)
-        stopped = stack.enter_context(_stopping())
+        stopped = stack.enter_context(interruptible()).is_set
         stack.enter_context(_settled())
         stack.enter_context(_first())
         status = stack.enter_context(Status(session))
@@ -222,25 +220,6 @@ def _announce_rest(seconds: float, retargeter: Retargeter) -> None:
             "the model does not know the actor at rest and takes the smallest pose for it: "
             "train with --neutral as well"
         )
-
-
-@contextmanager
-def _stopping() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C, and a request to end, stop the session; a second Ctrl-C stops at once."""
-    asked = threading.Event()
-    before: dict[int, Any] = {}
-
-    def stop(number: int, _frame: FrameType | None) -> None:
-        asked.set()
-        signal.signal(number, before[number] or signal.SIG_DFL)
-
-    for one in (signal.SIGINT, signal.SIGTERM):
-        before[one] = signal.signal(one, stop)
-    try:
-        yield asked.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.interrupt import interruptible
 from facert.cli.shared.options import ACTOR, HOST, PORT, RIG, SHAPES, TARGET, TRUTH
 from facert.errors import InputError, reading
 
@@ -41,7 +42,7 @@ def command(
     """
     import facert
     from facert.io.formats import read_rig_file, read_source_file, read_take_file, targets_for
-    from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
+    from facert.pages.server import address, page_server, require_viser
 
     require_viser()
     from facert.pages.view_page import ViewPage
@@ -60,8 +61,9 @@ def command(
     with page_server(path.name, host, port) as server:
         page = ViewPage(server, performance, actor)
         console.show(f"{address(server)} (Ctrl-C ends it)")
-        wait_for_interrupt()
-        page.worker.stop()
+        with interruptible() as asked:
+            asked.wait()
+        page.stop()
 
 
 def _performance(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.interrupt import interruptible
 from facert.cli.shared.options import DEFAULT_MODEL
 from facert.errors import InputError, OutputExistsError, reading
 
@@ -35,7 +36,7 @@ class Files:
 def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     """Serve the page until Ctrl-C."""
     from facert.io.formats import read_rig_file, read_take_file
-    from facert.pages.server import address, page_server, require_viser, wait_for_interrupt
+    from facert.pages.server import address, page_server, require_viser
 
     require_viser()
     from facert.cli.commands.view import actor_of
@@ -52,7 +53,8 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
         with reading(files.rig):
             page = PosePage(server, rig, session, actor)
         console.show(f"{address(server)} (Ctrl-C ends it)")
-        wait_for_interrupt()
+        with interruptible() as asked:
+            asked.wait()
         page.stop()
     if session.saved:
         console.show(f"{session.output}: {session.saved} poses saved")
