@@ -79,13 +79,13 @@ class Predictor:
         self.stacked: FloatArray = np.ascontiguousarray(np.hstack([whitener.T, alpha]))
         self.whitener = np.ascontiguousarray(whitener)
         self.Z_T = np.ascontiguousarray(Z.T)
-        self.identity = np.eye(len(self.Z_T))
+        self.identity, self.zero = np.eye(len(self.Z_T)), np.zeros(1)
 
     def on(self, device: torch.device) -> Self:
         """The same on a torch device; it takes tensors, see `there`, and returns them."""
         moved = copy(self)
         moved.device = device
-        for name in ("Z", "stacked", "whitener", "Z_T", "identity"):
+        for name in ("Z", "stacked", "whitener", "Z_T", "identity", "zero"):
             setattr(moved, name, moved.there(getattr(self, name)))
         return moved
 
@@ -112,15 +112,15 @@ class Predictor:
 
     def predict(self, z: FloatArray) -> PosteriorPoint:
         """Mean and variance of a new observation at z (B, q), noise included."""
-        n, einsum = len(self.Z), namespace(z).einsum
+        n, xp = len(self.Z), namespace(z)
         offsets = z[:, :, None] - self.Z_T
-        squared = einsum("bqn,bqn->bn", offsets, offsets)
+        squared = xp.einsum("bqn,bqn->bn", offsets, offsets)
         k = self.kernel.value(squared)
         product = k @ self.stacked
         whitened, mean = product[:, :n], product[:, n:]  # Eq. (16) or (18)
         # Eq. (17). Rounding can take the difference below the noise, which is its least value.
-        explained = einsum("bn,bn->b", whitened, whitened)
-        variance = self.kernel.noise + (self.kernel.variance - explained).clip(0.0)
+        explained = xp.einsum("bn,bn->b", whitened, whitened)
+        variance = self.kernel.noise + xp.maximum(self.kernel.variance - explained, self.zero)
         return PosteriorPoint(mean, variance, offsets, squared, k, whitened)
 
     def solve(self, at: PosteriorPoint) -> FloatArray:

@@ -177,7 +177,7 @@ class SourceMapping:
         w = 1.0 / (self._train_variance + R)
         wb = w * b
         of_frame: FloatArray = 0.5 * xp.einsum("bd,bd->b", wb, b)
-        of_both: FloatArray = xp.hstack([w, wb]) @ means
+        of_both: FloatArray = xp.concatenate([w, wb], axis=1) @ means
         return of_both + energy + of_frame[:, None]
 
     def energy(self, z: FloatArray, observed: Observation) -> FloatArray:

@@ -36,5 +36,6 @@ def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, Flo
         spread = xp.einsum("bqd,bqd->bd", J, xp.linalg.solve(hessian, J))
         means.append(posterior.here(at.mean))  # Eq. (18)
         # Where Newton's method gave up the Hessian may be indefinite.
-        stds.append(posterior.here(xp.sqrt(at.variance[:, None] + spread.clip(0.0))))
+        variance = at.variance[:, None] + xp.maximum(spread, posterior.zero)
+        stds.append(posterior.here(xp.sqrt(variance)))
     return np.concatenate(means), np.concatenate(stds)

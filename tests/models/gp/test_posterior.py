@@ -4,17 +4,22 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from facert.models.gp.posterior import Posterior
-from facert.models.kernels import SquaredExponential
+from facert.models.kernels import KERNELS, SquaredExponential
 
-KERNEL = SquaredExponential(variance=1.4, inverse_width=0.5, noise=0.05)
+THETA = {"variance": 1.4, "inverse_width": 0.5, "noise": 0.05}
+KERNEL = SquaredExponential(**THETA)
 STEP = 1e-6
+
+
+def make_posterior(kernel):
+    rng = np.random.default_rng(0)
+    Z = rng.normal(size=(20, 2))
+    return Posterior(Z, np.sin(Z @ rng.normal(size=(2, 4))), kernel)
 
 
 @pytest.fixture
 def posterior():
-    rng = np.random.default_rng(0)
-    Z = rng.normal(size=(20, 2))
-    return Posterior(Z, np.sin(Z @ rng.normal(size=(2, 4))), KERNEL)
+    return make_posterior(KERNEL)
 
 
 @pytest.fixture
@@ -56,7 +61,9 @@ def test_the_variance_never_falls_below_the_noise(posterior):
     assert (posterior.predict(posterior.Z).variance >= KERNEL.noise).all()
 
 
-def test_jacobians_agree_with_finite_differences(posterior, z):
+@pytest.mark.parametrize("name", KERNELS)
+def test_jacobians_agree_with_finite_differences(name, z):
+    posterior = make_posterior(KERNELS[name](**THETA))
     G, H, J = posterior.jacobians(posterior.predict(z))
     by_field = {
         name: differences(lambda z, name=name: getattr(posterior.predict(z), name), z)

@@ -4,18 +4,18 @@ from scipy.optimize import minimize
 
 from facert.models.gp.posterior import Posterior
 from facert.models.gplvm.source_mapping import CHUNK, Observation, SourceMapping
-from facert.models.kernels import SquaredExponential
+from facert.models.kernels import KERNELS, SquaredExponential
 
-KERNEL = SquaredExponential(variance=1.2, inverse_width=0.5, noise=0.02)
+THETA = {"variance": 1.2, "inverse_width": 0.5, "noise": 0.02}
 SIGMA_C, SIGMA_T = 0.1, 0.2
 STEP = 1e-5
 
 
-def make_mapping(seed=0, latent_dim=2, columns=6):
+def make_mapping(seed=0, latent_dim=2, columns=6, kernel=SquaredExponential):
     rng = np.random.default_rng(seed)
     Z = rng.normal(size=(18, latent_dim))
     X = np.sin(Z @ rng.normal(size=(latent_dim, columns)))
-    return SourceMapping(Posterior(Z, X, KERNEL))
+    return SourceMapping(Posterior(Z, X, kernel(**THETA)))
 
 
 def make_frames(mapping, count, missing=0.0, seed=1):
@@ -44,7 +44,9 @@ def full_objective(mapping, x, z, frame, previous=None):
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.4])
-def test_gradient_and_hessian_agree_with_finite_differences(mapping, missing):
+@pytest.mark.parametrize("name", KERNELS)
+def test_gradient_and_hessian_agree_with_finite_differences(name, missing):
+    mapping = make_mapping(kernel=KERNELS[name])
     observed = Observation.of(make_frames(mapping, 5, missing), SIGMA_C)
     z = np.random.default_rng(2).normal(size=(5, 2))
     at = mapping._expand(z, observed)
@@ -128,6 +130,16 @@ def test_a_batch_equals_frame_by_frame(mapping):
         np.testing.assert_allclose(alone.z[0], batch.z[row], atol=1e-7)
         np.testing.assert_allclose(alone.x[0], batch.x[row], atol=1e-7)
         np.testing.assert_allclose(alone.hessian[0], batch.hessian[row], rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_frames_end_at_a_stationary_point(name):
+    mapping = make_mapping(kernel=KERNELS[name])
+    observed = Observation.of(make_frames(mapping, 30, missing=0.3), SIGMA_C)
+    mapped = mapping.solve(observed)
+    assert mapped.converged.all()
+    assert np.abs(mapping._expand(mapped.z, observed).gradient).max() < 1e-3
+    assert (np.linalg.eigvalsh(mapped.hessian) > 0).all()
 
 
 def solve_random_frames(seed):
