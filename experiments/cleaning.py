@@ -27,8 +27,7 @@ from facert.data.arrays import BoolArray, FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.models.gaussian import Gaussian
 from facert.preprocess.motion.estimate import estimate
-from facert.preprocess.motion.interpolation import interpolated
-from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.motion.series import capture_noise, interpolated
 
 KINDS, SHARES, NOISES = ("scattered", "bursts", "region"), (0.1, 0.2, 0.4), (0.0, 0.05, 0.1)
 BURST, PERIOD = (5, 60), (20, 90)  # frames

@@ -17,7 +17,7 @@ from facert.data.resampling import nominal_rate
 from facert.errors import FacertError, InputError, NumericalError
 from facert.live.frames import Frame
 from facert.live.opening import PlacementWatch, RestWatch
-from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.faults import FaultDetector
 from facert.retarget.options import RetargetOptions
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class LiveModel:
         self._rest_watch = None
         if rest_seconds is not None:
             seen = self._loaded.options.detect and pattern.source.kind == "markers"
-            watch = MarkerWatch(len(pattern.source.names)) if seen else None
+            watch = FaultDetector(len(pattern.source.names)) if seen else None
             self._rest_watch = RestWatch(rest_seconds, watch)
         self._placement: PlacementWatch | None = None
         if rest_seconds is None and pattern.source.kind == "markers":

@@ -12,7 +12,7 @@ from facert.data.arrays import FloatArray
 from facert.data.names import NameIndex
 from facert.live.frames import Frame
 from facert.mesh.rigid import align, determined
-from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.faults import FaultDetector
 from facert.preprocess.neutral import median_at_rest
 
 if TYPE_CHECKING:
@@ -38,11 +38,11 @@ class RestWatch:
     ----------
     seconds : float
         From the session's first frame.
-    watch : MarkerWatch, optional
+    watch : FaultDetector, optional
         Finds the markers that are at fault: a lost one may be written as (0, 0, 0).
     """
 
-    def __init__(self, seconds: float, watch: MarkerWatch | None = None) -> None:
+    def __init__(self, seconds: float, watch: FaultDetector | None = None) -> None:
         self._seconds, self._watch = seconds, watch
         self._frames: list[FloatArray] = []
         self.is_over = False
@@ -113,7 +113,7 @@ class PlacementWatch(RestWatch):
     """
 
     def __init__(self, retargeter: Retargeter, names: Sequence[str]) -> None:
-        super().__init__(SECONDS, MarkerWatch(len(names)))
+        super().__init__(SECONDS, FaultDetector(len(names)))
         self._retargeter = retargeter
         index = NameIndex(names)
         found = [(index.find(name), row) for row, name in enumerate(retargeter.source_names)]

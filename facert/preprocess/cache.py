@@ -1,6 +1,6 @@
-"""What is looked at twice is worked out once.
+"""A cache of one result, for what is asked of the same take again and again.
 
-One take is cleaned for training, again for retargeting, and anew after every label that an animator
+One take is cleaned for training, again for retargeting, and after every label that an animator
 adds, though no label changes its frames. Cleaning takes longer than training and mapping together.
 """
 
@@ -14,11 +14,10 @@ Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 
-def remembered(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """The function with a memory of its last call.
+def keep_last(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """The function with a cache of its last result, for equal arguments and contents of arrays.
 
-    Called with equal arguments, contents of arrays included, it returns the same result: its arrays
-    should not be writeable.
+    Arrays of the result should not be writeable.
     """
     last: tuple[str, Result] | None = None
 
@@ -27,11 +26,9 @@ def remembered(function: Callable[Given, Result]) -> Callable[Given, Result]:
         from joblib import hash as digest_of  # takes its time to import
 
         nonlocal last
-        digest, known = str(digest_of((args, kwargs))), last
-        if known is not None and known[0] == digest:
-            return known[1]
-        result = function(*args, **kwargs)
-        last = digest, result
-        return result
+        digest, known = str(digest_of((args, kwargs))), last  # another thread may replace it
+        if known is None or known[0] != digest:
+            known = last = digest, function(*args, **kwargs)
+        return known[1]
 
     return wrapper

@@ -1,7 +1,7 @@
-"""Bad markers: what a capture system wrote that is not where the marker was.
+"""Bad markers: positions that a capture system wrote and where the marker was not.
 
 ====================  ==========================================================================
-kind                  what gives it away
+kind                  how it is detected
 ====================  ==========================================================================
 zero                  a position of exactly (0, 0, 0): many systems write it for a lost marker
 frozen                the very same position over frames in which the others move: a held value
@@ -25,12 +25,15 @@ import numpy as np
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.take import Source, Take
 from facert.models.gaussian import Gaussian
-from facert.preprocess.cache import remembered
-from facert.preprocess.motion.interpolation import interpolated
+from facert.preprocess.cache import keep_last
+from facert.preprocess.motion.series import interpolated
 
 log = logging.getLogger(__name__)
 
-DOUBT = 1e-5
+HELD = 5
+"""Live, a marker is held that repeats its position so often while most others move; rounded
+positions repeat now and then as well."""
+UNLIKELY = 1e-5
 """A run of repeats whose chance is less than this is a held value."""
 ORDINARY, FAR = 0.9, 3.0
 """A spike lies so many times farther off than this share of all positions do."""
@@ -51,7 +54,7 @@ FIT = 500
 
 @dataclass(frozen=True, eq=False)
 class Faults:
-    """Where a source is not to be believed, by kind, each (T, M)."""
+    """Bad markers of a source by kind, each (T, M)."""
 
     zero: BoolArray
     frozen: BoolArray
@@ -60,11 +63,11 @@ class Faults:
 
     def __post_init__(self) -> None:
         for kind in fields(self):
-            frozen(getattr(self, kind.name))  # remembered: what one caller changed would stay
+            frozen(getattr(self, kind.name))  # cached: what one caller changed would stay
 
     @property
     def any(self) -> BoolArray:
-        """Of whatever kind, (T, M)."""
+        """Bad markers of any kind, (T, M)."""
         return np.asarray(self.zero | self.frozen | self.swapped | self.spiked)
 
     def __str__(self) -> str:
@@ -86,15 +89,15 @@ class Faults:
         return Source(np.where(mask, np.nan, source.values), source.names)
 
 
-@remembered
+@keep_last
 def find_faults(source: Source) -> Faults:
     """Bad markers of a take.
 
     Parameters
     ----------
     source : Source
-        Head motion may be in it; a held value can be told only before it is taken out. Weights,
-        which do rest and do jump, have no faults.
+        With its head motion: a held value shows only before that is taken out. Weights, which do
+        rest and do jump, have no faults.
 
     Returns
     -------
@@ -150,7 +153,7 @@ def held_values(markers: FloatArray) -> BoolArray:
     )
     chance = np.clip(np.maximum(others, own), 1.0 / max(frames, 2), 1.0)
     surprise = _total_of_run(np.where(repeats, -np.log(chance), 0.0), repeats)
-    return np.asarray(repeats & (surprise > -np.log(DOUBT)) & _released_far(steps))
+    return np.asarray(repeats & (surprise > -np.log(UNLIKELY)) & _released_far(steps))
 
 
 def _released_far(steps: FloatArray) -> BoolArray:
@@ -327,3 +330,32 @@ def _next_known(values: FloatArray) -> FloatArray:
     last = len(values) - 1
     rows = np.where(np.isnan(values), last, np.arange(len(values))[:, None])
     return np.take_along_axis(values, np.minimum.accumulate(rows[::-1], axis=0)[::-1], axis=0)
+
+
+class FaultDetector:
+    """Bad markers of a live stream, from the frames so far: zero and frozen ones.
+
+    Parameters
+    ----------
+    markers : int
+        How many there are.
+    """
+
+    def __init__(self, markers: int) -> None:
+        self._last = np.full((markers, 3), np.nan)
+        self._none: BoolArray = np.zeros(markers, dtype=np.bool_)
+        self._repeats: IntArray = np.zeros(markers, dtype=np.int64)
+
+    def step(self, markers: FloatArray) -> BoolArray:
+        """Which markers (M,) of one more frame (M, 3) are bad; NaN: not observed."""
+        repeated, last = markers == self._last, self._last
+        self._last = np.where(np.isnan(markers), last, markers)
+        if markers.all() and not repeated.any():  # as nearly always
+            self._repeats = np.zeros_like(self._repeats)
+            return self._none
+        zero = (markers == 0.0).all(axis=1)
+        same = repeated.all(axis=1)
+        whole = same.sum() > np.count_nonzero(~np.isnan(markers[:, 0])) / 2
+        # A whole frame that repeats was sent twice, or the face rests.
+        self._repeats = np.where(same, self._repeats + (not whole), 0)
+        return np.asarray(zero | (same & (self._repeats >= HELD)))

@@ -66,14 +66,6 @@ class Calibration:
         return np.asarray(X + self.shift + np.maximum(X - self.turn, 0.0) * self.stretch)
 
 
-def calibrated(X: FloatArray, own: FloatArray, learned: FloatArray, kind: SourceKind) -> FloatArray:
-    """Frames X (T, d) as they would have been in the recording that was learned from.
-
-    See `Calibration.of`.
-    """
-    return Calibration.of(own, learned, kind).apply(X)
-
-
 def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
     """The mean of some frames, (d,); NaN where none of them shows anything.
 

@@ -15,13 +15,8 @@ from facert.data.text import plural
 from facert.errors import InputError
 from facert.preprocess.faults import without_faults
 from facert.preprocess.known_poses import keep, pose_bounds
-from facert.preprocess.motion.estimate import (
-    LEAST_NOISE,
-    Estimate,
-    estimate_if_it_moves,
-    largest_step,
-)
-from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.motion.estimate import LEAST_NOISE, MotionEstimate, estimate_if_it_moves
+from facert.preprocess.motion.series import capture_noise, largest_step
 from facert.preprocess.neutral import at_rest, most_neutral
 from facert.preprocess.source_layout import SourceLayout
 from facert.preprocess.training_set import MIN_OBSERVED, TrainingSet, choose_training_set
@@ -49,14 +44,14 @@ class Prepared:
         The same with noise and gaps.
     units : Normalisation
         Of the measured source.
-    estimate : Estimate or None
+    estimate : MotionEstimate or None
         Of noise and motion; None where frames do not follow each other.
     """
 
     take: Take
     measured: Source
     units: Normalisation
-    estimate: Estimate | None
+    estimate: MotionEstimate | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,8 @@ from facert.data.take import Source, Take
 from facert.errors import InputError, NumericalError
 from facert.models.threads import threads_for
 from facert.preprocess.clean_source import clean_source
-from facert.preprocess.motion.estimate import FEWEST, grid
+from facert.preprocess.motion.estimate import FEWEST
+from facert.preprocess.motion.series import even_grid
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
@@ -128,7 +129,7 @@ class Retargeter(TrainedModel):
         """One frame after the other, as they would come live."""
         whole = replace(options, smooth=False)  # what is looked at beforehand is not smoothed
         rest = clean_source(take, self.layout, self.source_units, self.neutral, whole).rest
-        stream = self.stream(take.source.names, 1.0 / grid(take.time)[1], options, rest)
+        stream = self.stream(take.source.names, 1.0 / even_grid(take.time)[1], options, rest)
         with threads_for(1):
             steps = [stream.step(frame).complete() for frame in take.source.values]
         stds = [step.std for step in steps if step.std is not None]

@@ -11,7 +11,7 @@ from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Prediction
 from facert.preprocess.clean_source import ABSURD
-from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.faults import FaultDetector
 from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
@@ -94,13 +94,13 @@ class RetargetStream:
         self._shape = (len(names), 3) if markers else (len(names),)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
         self._columns = model.layout.columns(names)
-        self._watch = MarkerWatch(len(names)) if options.detect and markers else None
+        self._watch = FaultDetector(len(names)) if options.detect and markers else None
         self._new_filter = partial(_filter, model, fps, options)
         self._filter = self._new_filter()
-        self._heard: float | None = None
+        self._noise: float | None = None
         given = self._filter is None or options.sigma is not None
         self._meter = None if given else NoiseMeter(len(model.source_units.mean))
-        self._unheard: FloatArray | None = None
+        self._pending: FloatArray | None = None
         self._adjustments = options.adjustments or Adjustments.none(len(model.controls.names))
         self._scale = PoseScale(model.target_units, model.bounds, self._adjustments)
         self._smooth = model.method.stream()
@@ -120,18 +120,18 @@ class RetargetStream:
         own, model = self._columns.pick(self._checked(rest).ravel()), self._model
         self._calibration = Calibration.of(own, model.neutral, model.layout.kind)
         self._filter = self._new_filter()  # what it knows is where the face was
-        if self._filter is not None and self._heard is not None:
-            self._filter.hear(self._heard)
+        if self._filter is not None and self._noise is not None:
+            self._filter.set_noise(self._noise)
 
     def prepare(self) -> None:
         """Do what need not wait for the next frame; `step` does it where nobody did."""
         if self._filter is None:
             return
-        if self._meter is not None and self._unheard is not None:
-            heard, self._unheard = self._meter.step(self._unheard), None
-            if heard is not None:
-                self._heard = max(heard, LEAST_NOISE)
-                self._filter.hear(self._heard)
+        if self._meter is not None and self._pending is not None:
+            sigma, self._pending = self._meter.step(self._pending), None
+            if sigma is not None:
+                self._noise = max(sigma, LEAST_NOISE)
+                self._filter.set_noise(self._noise)
         self._filter.look_ahead()
 
     def step(self, values: FloatArray) -> Streamed:
@@ -191,7 +191,7 @@ class RetargetStream:
         """The frame without noise, (d_x,), and the variance of what it did not show, (1, d_x)."""
         if self._filter is None:
             return frame, None
-        self._unheard = frame
+        self._pending = frame
         mean = self._filter.step(frame, seen)
         return mean, None if seen is None else np.where(seen, 0.0, self._filter.variance)[None]
 

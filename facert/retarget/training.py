@@ -13,7 +13,7 @@ from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
-from facert.preprocess.motion.estimate import Estimate
+from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.preparation import TrainingData, training_data
 from facert.regions.learning import Learned, Start, learn
 from facert.retarget.retargeter import Retargeter
@@ -109,7 +109,7 @@ def _start(start: Retargeter, data: TrainingData) -> Start:
     return Start(start.method, start.source_units, start.target_units, difference)
 
 
-def _noise_figures(found: Estimate | None, unit: str) -> dict[str, Any]:
+def _noise_figures(found: MotionEstimate | None, unit: str) -> dict[str, Any]:
     """Noise and motion in the take's units."""
     if found is None:
         return {}

@@ -4,7 +4,7 @@ import numpy as np
 
 from facert.live.frames import Frame
 from facert.live.opening import RestWatch
-from facert.preprocess.live_faults import MarkerWatch
+from facert.preprocess.faults import FaultDetector
 
 
 def watched(values, seconds=1.0, fps=10.0):
@@ -50,7 +50,7 @@ def test_an_actor_who_moves_does_not_rest(caplog):
 def test_a_lost_marker_written_as_zero_does_not_rest_there():
     frames = 1.0 + 0.001 * np.random.default_rng(0).normal(size=(10, 3, 3))
     frames[:, 1] = 0.0
-    watch = RestWatch(1.0, MarkerWatch(3))
+    watch = RestWatch(1.0, FaultDetector(3))
     for number, row in enumerate([*frames, frames[0]]):
         watch.see(Frame(number / 10, row, 0.0))
     rest = watch.rest(scale=1.0)

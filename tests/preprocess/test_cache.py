@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facert.preprocess.cache import remembered
+from facert.preprocess.cache import keep_last
 from facert.preprocess.faults import find_faults
 from facert.preprocess.motion.estimate import estimate
 
@@ -10,7 +10,7 @@ from facert.preprocess.motion.estimate import estimate
 def counted():
     calls = []
 
-    @remembered
+    @keep_last
     def total(values, scale=1.0):
         calls.append(values)
         return scale * values.sum()
@@ -34,10 +34,10 @@ def test_other_contents_are_worked_out_anew(counted):
     assert len(calls) == 3
 
 
-def test_an_error_is_not_remembered():
+def test_an_error_is_not_kept():
     failing = iter([True, False])
 
-    @remembered
+    @keep_last
     def sometimes(x):
         if next(failing):
             raise ValueError
@@ -56,7 +56,7 @@ def test_a_take_is_cleaned_once_for_training_and_retargeting(make_take):
     assert estimate(again, take.time, 0.1) is not first
 
 
-def test_nobody_can_change_what_is_remembered(make_take):
+def test_nobody_can_change_what_is_kept(make_take):
     take = make_take()
     found, faults = estimate(take.source.matrix, take.time), find_faults(take.source)
     for array in (found.frames, found.std, found.given, faults.zero, faults.spiked):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import facert
 from facert import InputError, Settings, Source
-from facert.preprocess.motion.filtering import HEARD
+from facert.preprocess.motion.filtering import NOISE_FRAMES
 from facert.retarget.options import AS_IT_IS, Adjustments, PoseScale, RetargetOptions
 
 
@@ -229,13 +229,13 @@ def test_a_stream_may_learn_later_where_the_actor_rests(retargeter, noisy):
 
 
 @pytest.mark.parametrize("louder", [3.0, 10.0])
-def test_when_another_noise_is_heard_the_source_goes_on_where_it_is(retargeter, truth, louder):
+def test_with_another_noise_the_source_goes_on_where_it_is(retargeter, truth, louder):
     scale = louder * 0.05 * truth.source.matrix.std(axis=0).max()
     noise = scale * np.random.default_rng(1).normal(size=truth.source.values.shape)
     values = truth.source.values + noise
     stream = retargeter.stream(truth.source.names, truth.fps)
     errors = np.array([stream.step(frame).source for frame in values]) - truth.source.values
-    assert rms(errors[HEARD:]) < 1.1 * rms(errors[10:HEARD])
+    assert rms(errors[NOISE_FRAMES:]) < 1.1 * rms(errors[10:NOISE_FRAMES])
 
 
 def test_a_frame_that_is_absurdly_far_is_refused_and_leaves_no_trace(retargeter, truth):
@@ -256,5 +256,5 @@ def test_calibrating_in_mid_stream_begins_the_filter_anew(retargeter, truth):
         stream.step(frame)
     stream.calibrate(rest)
     fresh = retargeter.stream(truth.source.names, truth.fps, rest=rest)
-    for frame in values[20 : HEARD - 1]:  # then the noise is measured, in other frames
+    for frame in values[20 : NOISE_FRAMES - 1]:  # then the noise is measured, in other frames
         np.testing.assert_allclose(stream.step(frame).params, fresh.step(frame).params, atol=1e-9)

@@ -1,4 +1,10 @@
-"""A take without noise and gaps, from itself alone."""
+"""A take without noise and gaps, by its own motion, and how sure that is.
+
+What the motion predicts of hidden entries is more certain than it should be: where a region is
+hidden, what would have shown its own motion is hidden as well. So their standard deviation is
+calibrated: the gaps of the take are hidden once more half a take later, where the same columns were
+seen, and a motion learned without these is compared with what was seen.
+"""
 
 from __future__ import annotations
 
@@ -8,32 +14,32 @@ from functools import cached_property
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
+from facert.data.arrays import BoolArray, FloatArray, frozen
 from facert.data.normalisation import STILL, Normalisation
 from facert.models.threads import threads_for
-from facert.preprocess.cache import remembered
-from facert.preprocess.motion.calibration import error_of_filling
+from facert.preprocess.cache import keep_last
 from facert.preprocess.motion.motion import Motion
-from facert.preprocess.motion.noise import capture_noise
+from facert.preprocess.motion.series import capture_noise, even_grid, largest_step
 
 log = logging.getLogger(__name__)
 
 FEWEST = 10
-"""Frames; in fewer there is no telling noise from motion."""
+"""Frames; in fewer, noise and motion cannot be separated."""
 UNRELATED = 0.5
 """Frames whose differences from one to the next have this share of the variance that differences
 of unrelated frames have do not follow each other."""
 LEAST_NOISE = 1e-4
 """Least standard deviation of the noise, normalised units: half a micrometre of skin."""
-ORDINARY = 0.9
-"""This share of the steps from frame to frame is no gap."""
-LONGEST = 60
-"""Frames; after a longer gap in time a face may be anywhere, so none is taken to be longer."""
+LEAST_COMPARED, WINDOW = 100, 1000
+"""Numbers that are compared to calibrate the standard deviation of hidden entries, at least, and
+frames that they are taken from, at most."""
+RANGE = (1.0, 10.0)
+"""Of the calibration: a take that happens to have been easy half a take later proves nothing."""
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
-    """Frames as they were, as far as can be told.
+class MotionEstimate:
+    """Frames without noise and gaps.
 
     Parameters
     ----------
@@ -65,11 +71,11 @@ class Estimate:
 
     def __post_init__(self) -> None:
         for array in (self.frames, self.spread, self.hidden, self.given):
-            frozen(array)  # it is remembered: what one caller changed would come to all
+            frozen(array)  # cached: what one caller changed would come to all
 
     @cached_property
     def std(self) -> FloatArray:
-        """Standard deviation, (T, d); of what was hidden, as the take's gaps tell that it is."""
+        """Standard deviation, (T, d); calibrated where entries were hidden."""
         if not self.hidden.any():
             return self.spread
         noise = max(self.sigma / self.units.scale, LEAST_NOISE)
@@ -83,8 +89,8 @@ class Estimate:
         return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} a frame"
 
 
-@remembered
-def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Estimate:
+@keep_last
+def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> MotionEstimate:
     """The joint estimate of all frames, see `facert.preprocess.motion.motion`.
 
     Parameters
@@ -101,7 +107,7 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Est
     InputError
         When nothing moves.
     """
-    places, step = grid(time)
+    places, step = even_grid(time)
     even = np.full((places[-1] + 1, X.shape[1]), np.nan)
     even[places] = X
     sigma = capture_noise(even) if sigma is None else sigma
@@ -116,12 +122,12 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Est
     frames[:, ever] = units.undo(mean[places])
     spread[:, ever] = units.scale * np.sqrt(variance[places])
     step = largest_step(frames)
-    return Estimate(frames, spread, np.isnan(X), sigma, step, motion, units, given)
+    return MotionEstimate(frames, spread, np.isnan(X), sigma, step, motion, units, given)
 
 
 def estimate_if_it_moves(
     X: FloatArray, time: FloatArray, sigma: float | None = None
-) -> Estimate | None:
+) -> MotionEstimate | None:
     """The joint estimate of a performance; None for single poses, or a face that never moves."""
     seen = X[:, ~np.isnan(X).all(axis=0)]
     spread = float(np.nanstd(seen, axis=0).max())
@@ -144,34 +150,40 @@ def _relation(X: FloatArray) -> float:
     return float(relations.min(initial=np.inf))
 
 
-def largest_step(X: FloatArray, sigma: float = 0.0) -> float:
-    """RMS step from frame to frame of the column that moves most, less what is noise.
+def error_of_filling(X: FloatArray, sigma: float, seconds: float) -> float:
+    """Root mean square error at hidden entries, relative to their predicted standard deviation.
 
     Parameters
     ----------
     X : array, shape (T, d)
-        NaN: not observed.
+        Normalised frames, evenly spaced in time; NaN: not observed. Every column was seen.
     sigma : float
         Standard deviation of the capture noise.
+    seconds : float
+        From frame to frame.
+
+    Returns
+    -------
+    float
+        Within `RANGE`; 1 where the take has too few gaps.
     """
-    squares = np.diff(X, axis=0) ** 2
-    known = ~np.isnan(squares)
-    means = np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return float(np.sqrt(max(means.max(initial=0.0) - 2.0 * sigma**2, sigma**2)))
+    hidden = np.isnan(X)
+    again = np.roll(hidden, len(X) // 2, axis=0) & ~hidden
+    again[:, (hidden | again).all(axis=0)] = False
+    window = _busiest(again)
+    compared = again[window]
+    if np.count_nonzero(compared) < LEAST_COMPARED:
+        return 1.0
+    given = np.where(again, np.nan, X)
+    mean, variance = Motion.learned(given, sigma, seconds).smooth(given[window], sigma)
+    square = float(np.mean((mean - X[window])[compared] ** 2)) - sigma**2
+    predicted = float(np.mean(variance[compared]))
+    return float(np.clip(np.sqrt(max(square, 0.0) / predicted), *RANGE))
 
 
-def grid(time: FloatArray) -> tuple[IntArray, float]:
-    """Places (T,) of frames on an even grid, and its step in seconds: a typical one.
-
-    Parameters
-    ----------
-    time : array, shape (T,)
-        Seconds, rising. Gaps longer than `LONGEST` frames are cut short.
-    """
-    steps = np.diff(time)
-    if not len(steps):
-        return np.zeros(1, dtype=np.int64), 1.0
-    # Not the median: packets may come in bursts.
-    step = float(np.sort(steps)[: max(int(ORDINARY * len(steps)), 1)].mean())
-    passed = np.clip(np.round(steps / step), 1, LONGEST)
-    return np.concatenate([[0], np.cumsum(passed)]).astype(np.int64), step
+def _busiest(marked: BoolArray) -> slice:
+    """The stretch of at most `WINDOW` frames (T, d) with most marks."""
+    totals = np.concatenate([[0], np.cumsum(marked.sum(axis=1))])
+    length = min(WINDOW, len(marked))
+    start = int(np.argmax(totals[length:] - totals[: len(totals) - length]))
+    return slice(start, start + length)

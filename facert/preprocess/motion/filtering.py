@@ -1,13 +1,13 @@
 """Noise out of a live source, gaps filled, frame by frame: the causal side of `motion`.
 
 A Kalman filter for the factors, and one for what they leave over of each column. Live, the face may
-do what the training take did not show. The factors leave it over, more than they should; then what
-is left over is taken to vary more, until it no longer surprises (as adaptive filters do, Mehra
-1970), and new motion passes.
+do what the training take did not show. The factors leave more of it over than they should; then
+the rest is taken to vary more, until it no longer surprises (an adaptive filter, Mehra 1970), and
+new motion passes.
 
-How sure the filter is of the factors depends on what was observed and not on where: as long as
-frames show the same markers, the gain settles and need not be computed again. All that can be told
-of a frame before it comes is told by `look_ahead`, in the time between two frames.
+The covariance of the factors depends on which columns were observed and not on their values: as
+long as frames show the same markers, the gain settles and need not be computed again. All that can
+be computed before a frame comes is done by `look_ahead`, in the time between two frames.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.preprocess.motion.factors import Factors
-from facert.preprocess.motion.matern import transition
 from facert.preprocess.motion.motion import LEAST_VARIANCE, Motion
-from facert.preprocess.motion.noise import capture_noise
-from facert.preprocess.motion.smoothing import forward_covariance
+from facert.preprocess.motion.motion_factors import MotionFactors
+from facert.preprocess.motion.series import capture_noise
+from facert.preprocess.motion.smoothing import forward_covariance, transition
 
 LEAST_REST = 1e-2
 """Least variance of what is left over of a column, relative to that of the noise."""
@@ -33,9 +32,9 @@ wider at all than in training."""
 FAR, GROSS = 6.0, 1.0
 """A number so many standard deviations off, and so many normalised units, is not believed for a
 frame: nothing moves so far so quickly, but bad markers do."""
-HEARD = 120
-"""Frames that noise is measured in."""
-MISHEARD = 2.0
+NOISE_FRAMES = 120
+"""Frames that noise is estimated from."""
+OTHER_NOISE = 2.0
 """Change of the noise's variance, as a factor, after which what was learned with it is void."""
 SETTLED = 1e-4
 """Relative change of the covariance in a frame below which it is taken to have settled."""
@@ -65,10 +64,10 @@ class MotionFilter:
         self._begun = self._looked = False
         self._was_off: Seen = None
 
-    def hear(self, sigma: float) -> None:
+    def set_noise(self, sigma: float) -> None:
         """Go on with another noise."""
-        self._shared.hear(self._motion.seen_with(sigma))
-        self._rest.hear(sigma**2)
+        self._shared.set_noise(self._motion.seen_with(sigma))
+        self._rest.set_noise(sigma**2)
         self._looked = False
 
     def look_ahead(self) -> None:
@@ -79,7 +78,7 @@ class MotionFilter:
             self._looked = True
 
     def step(self, frame: FloatArray, seen: Seen = None) -> FloatArray:
-        """The mean (d,) of one more normalised frame (d,), of which `seen` tells what counts."""
+        """The mean (d,) of one more normalised frame (d,), where `seen`."""
         self.look_ahead()
         seen = self._believed(frame, seen)
         mean = self._shared.step(frame, seen)
@@ -93,7 +92,7 @@ class MotionFilter:
         return self._shared.variance + self._rest.variance
 
     def _believed(self, frame: FloatArray, seen: Seen) -> Seen:
-        """What was seen, but for what is far off for the first time; the second, it is there."""
+        """The columns seen, without those far off for the first time; then they count."""
         if not self._begun:
             return seen
         shared, rest = self._shared, self._rest
@@ -109,7 +108,7 @@ class MotionFilter:
 
 @dataclass(frozen=True, eq=False)
 class _Update:
-    """What a frame that shows some columns does to the factors, wherever they are.
+    """The update of the factors by a frame that shows some columns, whatever its values.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ class _Update:
 class _FactorFilter:
     """Of the factors z and their velocities, observed together, see `smoothing.smooth_factors`."""
 
-    def __init__(self, factors: Factors, rates: FloatArray) -> None:
+    def __init__(self, factors: MotionFactors, rates: FloatArray) -> None:
         self._factors = factors
         q, d = factors.count, len(factors.mean)
         blocks = transition(rates)
@@ -155,7 +154,7 @@ class _FactorFilter:
         """Of the latest mean, (d,)."""
         return self._last.variance
 
-    def hear(self, factors: Factors) -> None:
+    def set_noise(self, factors: MotionFactors) -> None:
         """Go on with another noise."""
         self._factors, self._last = factors, replace(self._last, settled=False)
 
@@ -177,9 +176,9 @@ class _FactorFilter:
 
     def _update(self, seen: Seen) -> _Update:
         factors, q, before = self._factors, self._factors.count, self._last.P
-        trust = 1.0 / factors.noise if seen is None else seen / factors.noise
-        trusted = factors.weights * trust[:, None]
-        precision = factors.weights.T @ trusted
+        weight = 1.0 / factors.noise if seen is None else seen / factors.noise
+        weighted = factors.weights * weight[:, None]
+        precision = factors.weights.T @ weighted
         P = self._F @ before @ self._F.T + self._Q
         pulled = P[:, :q] @ np.linalg.inv(np.eye(q) + precision @ P[:q, :q])
         after = P - pulled @ precision @ P[:q]
@@ -187,7 +186,7 @@ class _FactorFilter:
         change = np.abs(after.diagonal() - before.diagonal()).max()
         return _Update(
             seen,
-            gain=pulled @ trusted.T,
+            gain=pulled @ weighted.T,
             P=after,
             variance=factors.variance(after[None, :q, :q])[0],
             settled=bool(change < SETTLED * after.diagonal().min()),
@@ -211,7 +210,7 @@ class _SeriesFilter:
         self._begin()
 
     def _begin(self) -> None:
-        """As sure as before the first frame, of what is where it is and at rest."""
+        """Begin with the prior covariance again, at the present values and at rest."""
         self._m = self._m * [[1.0], [0.0]]
         # Of the latest frame: the covariance before it was seen, and the gain.
         self._P, self._gain = self._prior, np.zeros_like(self._m)
@@ -234,11 +233,11 @@ class _SeriesFilter:
         """Of the latest mean, (d,)."""
         return np.asarray(self._P[0] * (1.0 - self._gain[0]))
 
-    def hear(self, noise: float) -> None:
+    def set_noise(self, noise: float) -> None:
         """Go on with another variance of the noise."""
         before, self._noise = self._noise, noise
         self._predicted = self._predicted + (noise - before)
-        if not before / MISHEARD < noise < before * MISHEARD:
+        if not before / OTHER_NOISE < noise < before * OTHER_NOISE:
             self._begin()  # what was learned took noise for motion, or motion for noise
 
     def look_ahead(self) -> None:
@@ -275,16 +274,16 @@ def _known(values: FloatArray, seen: Seen) -> FloatArray:
 
 
 class NoiseMeter:
-    """Measures the noise of a live source now and then."""
+    """Estimates the noise of a live source anew every `NOISE_FRAMES` frames."""
 
     def __init__(self, columns: int) -> None:
-        self._frames = np.full((HEARD, columns), np.nan)
+        self._frames = np.full((NOISE_FRAMES, columns), np.nan)
         self._count = 0
 
     def step(self, frame: FloatArray) -> float | None:
-        """The standard deviation of the noise in the last frames, when it is time to tell."""
-        self._frames[self._count % HEARD] = frame
+        """The standard deviation of the noise in the last frames, when they are all new."""
+        self._frames[self._count % NOISE_FRAMES] = frame
         self._count += 1
-        if self._count % HEARD or not np.isfinite(self._frames).any():
+        if self._count % NOISE_FRAMES or not np.isfinite(self._frames).any():
             return None
         return capture_noise(self._frames)

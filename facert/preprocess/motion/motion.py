@@ -1,8 +1,8 @@
-"""How a source moves: what tells a frame from its neighbours in time, through noise and gaps.
+"""How a source moves in time, to estimate its frames through noise and gaps.
 
 Two layers, each smooth in time: the few factors that move the face, estimated over all frames
-together from whatever each shows, and what of every column they leave over, which tells between
-one sight of a marker and the next.
+together from whatever each shows, and the rest that they leave of every column, which fills in
+between two sights of a marker.
 """
 
 from __future__ import annotations
@@ -14,10 +14,15 @@ import numpy as np
 
 from facert.data.array_group import ArrayGroup
 from facert.data.arrays import FloatArray, IntArray
-from facert.preprocess.motion.factors import Factors
-from facert.preprocess.motion.interpolation import interpolated
-from facert.preprocess.motion.matern import QUICKEST, decay
-from facert.preprocess.motion.smoothing import Smoothed, smooth_factors, smooth_series
+from facert.preprocess.motion.motion_factors import MotionFactors
+from facert.preprocess.motion.series import interpolated
+from facert.preprocess.motion.smoothing import (
+    QUICKEST,
+    Smoothed,
+    decay,
+    smooth_factors,
+    smooth_series,
+)
 
 FACTORS = 16
 FIT = 1000
@@ -41,10 +46,10 @@ class Motion(ArrayGroup):
 
     Parameters
     ----------
-    factors : Factors
+    factors : MotionFactors
         Of unit variance each; their noise is what else is in a column, without capture noise.
     rates : array, shape (q,)
-        How quickly each factor moves, see `facert.preprocess.motion.matern`.
+        How quickly each factor moves, see `facert.preprocess.motion.smoothing`.
     rest, rest_rates : array, shape (d,)
         Variance and rate of what the factors leave over of each column.
     clock : array, shape (2,)
@@ -52,7 +57,7 @@ class Motion(ArrayGroup):
         capture noise.
     """
 
-    factors: Factors
+    factors: MotionFactors
     rates: Annotated[FloatArray, "q"]
     rest: Annotated[FloatArray, "x"]
     rest_rates: Annotated[FloatArray, "x"]
@@ -90,17 +95,17 @@ class Motion(ArrayGroup):
         some = _spread(np.flatnonzero(seen.any(axis=1)), FIT)
         some = some if seen[some].any(axis=0).all() else np.arange(len(X))
         filled = interpolated(X, np.arange(len(X), dtype=np.float64))
-        factors = Factors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
+        factors = MotionFactors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
         factors, rates, left = _paced(factors, X)
         own, clock = factors.with_noise(-(sigma**2), LEAST_VARIANCE), np.array([seconds, sigma])
         return cls(own, rates, *_rest(left, sigma), clock)
 
-    def seen_with(self, sigma: float) -> Factors:
+    def seen_with(self, sigma: float) -> MotionFactors:
         """The factors as a capture with noise of this standard deviation shows them."""
         return self.factors.with_noise(sigma**2)
 
     def smooth(self, X: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance (T, d) of what all frames together tell of each; see `learned`.
+        """Mean and variance (T, d) of each frame given all of them; see `learned`.
 
         Long takes are done in parts that overlap, so that memory stays bounded.
         """
@@ -120,7 +125,7 @@ class Motion(ArrayGroup):
         left = np.where(seen, X - frames, np.nan)
         rest, input_variance = smooth_series(left, seen, self.rest, sigma**2, self.rest_rates)
         variance = factors.variance(found.covariance) + input_variance
-        # The layers take each other for noise: of what was seen, both know less than it told.
+        # The layers take each other for noise: both know less of what was seen than it showed.
         return frames + rest, np.where(seen, np.minimum(variance, sigma**2), variance)
 
 
@@ -130,7 +135,7 @@ def _spread(indices: IntArray, most: int) -> IntArray:
     return indices[np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))]
 
 
-def _paced(factors: Factors, X: FloatArray) -> tuple[Factors, FloatArray, FloatArray]:
+def _paced(factors: MotionFactors, X: FloatArray) -> tuple[MotionFactors, FloatArray, FloatArray]:
     """The factors in units of their deviation, how quickly each moves, and what they leave over.
 
     The latter of stretches of the take, (length, stretches, d).
@@ -149,7 +154,7 @@ def _paced(factors: Factors, X: FloatArray) -> tuple[Factors, FloatArray, FloatA
     return factors, rates, windows - factors.frames(_smoothed(factors, windows, rates).mean)
 
 
-def _smoothed(factors: Factors, windows: FloatArray, rates: FloatArray) -> Smoothed:
+def _smoothed(factors: MotionFactors, windows: FloatArray, rates: FloatArray) -> Smoothed:
     """The factors of stretches (length, stretches, d), each on its own."""
     shape, q = windows.shape[:2], factors.count
     precision, pull = factors.information(windows.reshape(-1, windows.shape[2]))

@@ -1,11 +1,15 @@
-"""The joint Gaussian estimate over time: Kalman filter, then Rauch, Tung and Striebel's smoother.
+"""Smooth motion in time: a Gaussian process with the Matérn kernel of order 3/2, and its smoother.
+
+Its correlation over one frame is ρ = (1 + a) exp(-a). Such a process has a velocity; together they
+are a Markov chain (Hartikainen and Särkkä 2010), so the joint estimate over all frames takes a
+Kalman filter and Rauch, Tung and Striebel's smoother.
 
 One recursion over the frames, forward and back, for factors that are observed together, and one for
 series that are observed each on its own (all at once). Arrays of the former have time first.
 
-How well something is known depends on which entries were observed, not on what they were. Where
-frames show the same entries for a while, it soon no longer changes from frame to frame; from there
-on only the means go on. Most of a take is like that, and costs a tenth.
+Covariances depend on which entries were observed, not on their values. Where frames show the same
+entries for a while, they soon no longer change from frame to frame; from there on only the means
+go on. Most of a take is like that, and costs a tenth.
 """
 
 from __future__ import annotations
@@ -15,12 +19,25 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+from scipy.special import lambertw
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.preprocess.motion.matern import transition
 
+SLOWEST, QUICKEST = 0.02, 4.0
+"""Range of a: motion that takes some 100 frames, and hardly any memory from frame to frame."""
 SETTLED = 1e-10
 """A covariance that changes no more than by this, relative to its variances, no longer does."""
+
+
+def decay(correlation: FloatArray) -> FloatArray:
+    """The rate a of processes whose values in neighbouring frames are correlated so, (q,)."""
+    inside = np.clip(correlation, 0.0, 1.0 - 1e-6)  # at 1 rounding leaves the range of W
+    return np.clip(-1.0 - np.real(lambertw(-inside / np.e, -1)), SLOWEST, QUICKEST)
+
+
+def transition(a: FloatArray) -> FloatArray:
+    """How value and velocity of each process (both of unit variance) go on, (2, 2, q)."""
+    return np.asarray(np.exp(-a) * np.array([[1.0 + a, a], [-a, 1.0 - a]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +57,10 @@ class Smoothed:
     following: FloatArray
 
 
-class _Knowledge(NamedTuple):
-    """Covariances of factors and velocities before and after a frame, and what the frame does.
+class _Update(NamedTuple):
+    """Covariances of factors and velocities before and after a frame is seen.
 
-    The mean m goes over to keep m + take pull.
+    The frame takes the mean m to keep m + take pull.
     """
 
     before: FloatArray
@@ -52,7 +69,7 @@ class _Knowledge(NamedTuple):
     take: FloatArray
 
 
-class _SeriesKnowledge(NamedTuple):
+class _SeriesUpdate(NamedTuple):
     """Covariances (3, d) of value and velocity before and after a frame, and its gain (2, d)."""
 
     before: FloatArray
@@ -60,20 +77,20 @@ class _SeriesKnowledge(NamedTuple):
     gain: FloatArray
 
 
-Known = TypeVar("Known", _Knowledge, _SeriesKnowledge)
+Update = TypeVar("Update", _Update, _SeriesUpdate)
 
 
 def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Smoothed:
-    """Smooth factors, each of unit variance and moving as `matern` has it.
+    """Smooth factors, each of unit variance and moving as this file has it.
 
     Parameters
     ----------
     precision : array, shape (T, ..., q, q)
-        What each frame tells of its factors.
+        Precision of each frame's factors by what it shows.
     pull : array, shape (T, ..., q)
-        Precision times the factors that the frame tells of.
+        The same times the factors that it shows.
     a : array, shape (q,)
-        How quickly each factor moves, see `matern.decay`.
+        How quickly each factor moves, see `decay`.
     """
     frames, q = len(pull), pull.shape[-1]
     F = np.block([[np.diag(block) for block in row] for row in transition(a)])
@@ -82,15 +99,15 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
     filtered = _filtered(precision, F)
     m = np.zeros((*pull.shape[1:-1], 2 * q))
     before, after = (np.empty((frames, *m.shape)) for _ in range(2))
-    for t, knowledge in enumerate(filtered):
+    for t, update in enumerate(filtered):
         before[t] = m @ F.T if t else m
-        m = _times(knowledge.keep, before[t]) + _times(knowledge.take, pull[t])
+        m = _times(update.keep, before[t]) + _times(update.take, pull[t])
         after[t] = m
     return _smoothed(filtered, F, before, after)
 
 
-def _filtered(precision: FloatArray, F: FloatArray) -> list[_Knowledge]:
-    """What is known at each frame from those so far."""
+def _filtered(precision: FloatArray, F: FloatArray) -> list[_Update]:
+    """The filter's update at each frame."""
     one = np.eye(len(F))
     P = np.broadcast_to(one, (*precision.shape[1:-2], *F.shape))
     drift = one - F @ F.T
@@ -101,10 +118,10 @@ def _forward(
     frames: FloatArray | BoolArray,
     P: FloatArray,
     carry: Callable[[FloatArray], FloatArray],
-    see: Callable[[FloatArray, FloatArray], Known],
+    see: Callable[[FloatArray, FloatArray], Update],
     settled: Callable[[FloatArray, FloatArray], bool],
-) -> list[Known]:
-    """What is known at each frame from those so far; where that is settled, the very same object.
+) -> list[Update]:
+    """The filter's update at each frame; where covariances have settled, the very same object.
 
     Parameters
     ----------
@@ -115,11 +132,11 @@ def _forward(
     carry : callable
         Covariances at the next frame from those at one.
     see : callable
-        What is known by these covariances and one of the frames.
+        The update from these covariances and one of the frames.
     settled : callable
         Whether two covariances are the same.
     """
-    found: list[Known] = []
+    found: list[Update] = []
     for frame, repeats in zip(frames, _repeats(frames), strict=True):
         if repeats and len(found) > 1 and found[-1] is found[-2]:
             found.append(found[-1])
@@ -137,14 +154,14 @@ def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
     return np.concatenate([[False], same])
 
 
-def _seen(P: FloatArray, precision: FloatArray) -> _Knowledge:
+def _seen(P: FloatArray, precision: FloatArray) -> _Update:
     q = precision.shape[-1]
     take = P[..., :q] @ np.linalg.inv(np.eye(q) + precision @ P[..., :q, :q])
-    told = take @ precision
+    gain = take @ precision
     keep = np.broadcast_to(np.eye(2 * q), P.shape).copy()
-    keep[..., :q] -= told
-    after = P - told @ P[..., :q, :]
-    return _Knowledge(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, take)
+    keep[..., :q] -= gain
+    after = P - gain @ P[..., :q, :]
+    return _Update(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, take)
 
 
 def _settled(P: FloatArray, last: FloatArray) -> bool:
@@ -160,7 +177,7 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _smoothed(
-    filtered: list[_Knowledge], F: FloatArray, before: FloatArray, after: FloatArray
+    filtered: list[_Update], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> Smoothed:
     """Back over the frames; `before` and `after`, (T, ..., 2 q), are means, and are changed."""
     frames, q = len(filtered), F.shape[0] // 2
@@ -200,7 +217,7 @@ def smooth_series(
     noise : float
         Variance of an observation.
     a : array, shape (d,)
-        How quickly each series moves, see `matern.decay`.
+        How quickly each series moves, see `decay`.
 
     Returns
     -------
@@ -210,22 +227,22 @@ def smooth_series(
     filtered = _series_filtered(seen, variance, noise, F)
     before, after = (np.empty((len(X), 2, len(a))) for _ in range(2))
     m = np.zeros((2, len(a)))
-    for t, knowledge in enumerate(filtered):
+    for t, update in enumerate(filtered):
         before[t] = _carried(F, m) if t else m
-        m = before[t] + knowledge.gain * (X[t] - before[t, 0])
+        m = before[t] + update.gain * (X[t] - before[t, 0])
         after[t] = m
     return _series_smoothed(filtered, F, before, after)
 
 
 def _series_filtered(
     seen: BoolArray, variance: FloatArray, noise: float, F: FloatArray
-) -> list[_SeriesKnowledge]:
+) -> list[_SeriesUpdate]:
     """As `_filtered`."""
 
-    def see(P: FloatArray, there: FloatArray) -> _SeriesKnowledge:
+    def see(P: FloatArray, there: FloatArray) -> _SeriesUpdate:
         gain = np.where(there, P[:2] / (P[0] + noise), 0.0)
         after = P - np.stack([gain[0] * P[0], gain[0] * P[1], gain[1] * P[1]])
-        return _SeriesKnowledge(P, after, gain)
+        return _SeriesUpdate(P, after, gain)
 
     forward, P = forward_covariance(F), np.stack([variance, np.zeros_like(variance), variance])
     drift = P - (forward * P).sum(axis=1)
@@ -233,7 +250,7 @@ def _series_filtered(
 
 
 def _series_smoothed(
-    filtered: list[_SeriesKnowledge], F: FloatArray, before: FloatArray, after: FloatArray
+    filtered: list[_SeriesUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """As `_smoothed`: mean and variance of the value, (T, d)."""
     frames, P = len(filtered), filtered[-1].after

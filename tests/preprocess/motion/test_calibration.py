@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from facert.data.arrays import rms
-from facert.preprocess.motion.calibration import RANGE, error_of_filling
-from facert.preprocess.motion.estimate import estimate
+from facert.preprocess.motion.estimate import RANGE, error_of_filling, estimate
 
 FRAMES, COLUMNS = 400, 24
 
@@ -38,8 +37,8 @@ def test_errors_are_predicted_within_a_factor_of_two(own, noise):
     truth = moving(own=own)
     given, hidden = hide(truth + noise * np.random.default_rng(2).normal(size=truth.shape))
     found = estimate(given, np.arange(FRAMES) / 30.0)
-    error, told = rms((found.frames - truth)[hidden]), rms(found.std[hidden])
-    assert 0.5 < told / error < 2.0
+    error, predicted = rms((found.frames - truth)[hidden]), rms(found.std[hidden])
+    assert 0.5 < predicted / error < 2.0
 
 
 def test_where_hidden_groups_move_on_their_own_the_model_alone_is_too_sure():
@@ -49,7 +48,7 @@ def test_where_hidden_groups_move_on_their_own_the_model_alone_is_too_sure():
     np.testing.assert_array_equal(found.std[~hidden], found.spread[~hidden])
 
 
-def test_without_gaps_or_with_few_there_is_nothing_to_tell():
+def test_without_gaps_or_with_few_nothing_is_calibrated():
     frames = moving()
     assert error_of_filling(frames, 0.001, 1.0 / 30.0) == 1.0
     frames[5, :3] = np.nan

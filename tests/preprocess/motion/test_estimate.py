@@ -6,18 +6,16 @@ from facert.errors import InputError
 from facert.io.formats import read_take_file
 from facert.models.gaussian import fill_gaps
 from facert.preprocess.motion import smoothing
-from facert.preprocess.motion.estimate import (
+from facert.preprocess.motion.estimate import estimate, estimate_if_it_moves
+from facert.preprocess.motion.motion_factors import MotionFactors
+from facert.preprocess.motion.series import (
     LONGEST,
-    estimate,
-    estimate_if_it_moves,
-    grid,
+    capture_noise,
+    even_grid,
+    interpolated,
     largest_step,
 )
-from facert.preprocess.motion.factors import Factors
-from facert.preprocess.motion.interpolation import interpolated
-from facert.preprocess.motion.matern import decay, transition
-from facert.preprocess.motion.noise import capture_noise
-from facert.preprocess.motion.smoothing import smooth_factors, smooth_series
+from facert.preprocess.motion.smoothing import decay, smooth_factors, smooth_series, transition
 
 
 def estimated(X, sigma=None):
@@ -139,7 +137,7 @@ def test_factors_are_learned_through_gaps():
     truth = rng.normal(size=(300, 3)) @ rng.normal(size=(3, 12)) / 2.0
     X = with_gaps(truth + 0.01 * rng.normal(size=truth.shape), 0.3)
     filled = interpolated(X, np.arange(300.0))
-    factors = Factors.learned(X, filled, 0.01, 3)
+    factors = MotionFactors.learned(X, filled, 0.01, 3)
     z, _ = factors.posterior(X)
     assert rms(factors.frames(z) - truth) < 0.05
     np.testing.assert_allclose(
@@ -233,7 +231,7 @@ def test_a_gap_in_time_is_a_gap_in_the_frames(frames):
     hidden[100:103] = np.nan
     through, across = estimate(hidden, time), estimate(frames[kept], time[kept])
     np.testing.assert_allclose(across.frames, through.frames[kept], atol=1e-10)
-    assert grid(time[kept])[0][-1] == 399
+    assert even_grid(time[kept])[0][-1] == 399
 
 
 def test_a_face_seen_for_a_moment_of_a_long_take_is_smoothed_there(frames):
@@ -247,13 +245,13 @@ def test_a_face_seen_for_a_moment_of_a_long_take_is_smoothed_there(frames):
 
 def test_packets_that_come_in_bursts_have_the_rate_that_they_have_on_average():
     time = np.repeat(np.arange(60) * 0.05, 3) + np.tile([0.0, 1e-4, 2e-4], 60)
-    places, step = grid(time)
+    places, step = even_grid(time)
     assert 0.01 < step < 0.02
     assert places[-1] < 2 * len(time)
 
 
 def test_gaps_of_hours_are_cut_short():
-    places, step = grid(np.array([0.0, 0.1, 0.2, 7200.0]))
+    places, step = even_grid(np.array([0.0, 0.1, 0.2, 7200.0]))
     assert places.tolist() == [0, 1, 2, 2 + LONGEST]
     assert step == pytest.approx(0.1)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facert.data.normalisation import Normalisation
-from facert.preprocess.live_faults import HELD, MarkerWatch
+from facert.preprocess.faults import HELD, FaultDetector
 from facert.preprocess.motion import filtering
 from facert.preprocess.motion.filtering import MotionFilter, _FactorFilter, _SeriesFilter
 from facert.preprocess.motion.motion import Motion
@@ -84,9 +84,9 @@ def test_hidden_markers_come_back(motion, frames, noisy):
 
 def test_what_is_to_come_changes_nothing(motion, noisy):
     mean, variance = filtered(motion, noisy)
-    begun, doubt = filtered(motion, noisy[:50])
+    begun, begun_variance = filtered(motion, noisy[:50])
     np.testing.assert_array_equal(begun, mean[:50])
-    np.testing.assert_array_equal(doubt, variance[:50])
+    np.testing.assert_array_equal(begun_variance, variance[:50])
 
 
 def test_a_settled_gain_is_the_gain(motion, noisy, monkeypatch):
@@ -111,7 +111,7 @@ def test_rates_are_for_a_time_not_for_a_frame(motion):
 
 
 def test_zeros_and_held_markers_are_bad_while_others_move():
-    rng, watch = np.random.default_rng(0), MarkerWatch(6)
+    rng, watch = np.random.default_rng(0), FaultDetector(6)
     frames = rng.normal(size=(20, 6, 3))
     frames[5:15, 2] = frames[4, 2]
     frames[8, 3] = 0.0
@@ -123,7 +123,7 @@ def test_zeros_and_held_markers_are_bad_while_others_move():
 
 
 def test_a_face_at_rest_and_doubled_frames_are_not_held():
-    rng, watch = np.random.default_rng(0), MarkerWatch(5)
+    rng, watch = np.random.default_rng(0), FaultDetector(5)
     frames = np.repeat(rng.normal(size=(6, 5, 3)), 6, axis=0)
     assert not np.array([watch.step(frame) for frame in frames]).any()
 

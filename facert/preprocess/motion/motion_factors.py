@@ -25,8 +25,8 @@ ONCE_MORE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Factors(ArrayGroup):
-    """What moves together.
+class MotionFactors(ArrayGroup):
+    """A few factors that move all columns.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Factors(ArrayGroup):
     noise: Annotated[FloatArray, "x"]
 
     @classmethod
-    def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> Factors:
+    def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> MotionFactors:
         """From frames with gaps.
 
         Parameters
@@ -66,7 +66,7 @@ class Factors(ArrayGroup):
         return factors._turned()
 
     @classmethod
-    def _principal(cls, X: FloatArray, count: int, least: float) -> Factors:
+    def _principal(cls, X: FloatArray, count: int, least: float) -> MotionFactors:
         covariance = np.cov(X, rowvar=False, bias=True).reshape(X.shape[1], X.shape[1])
         variances, axes = np.linalg.eigh(covariance)
         count = min(count, X.shape[1])
@@ -76,7 +76,7 @@ class Factors(ArrayGroup):
         return cls(X.mean(axis=0), weights, left + least**2)
 
     def information(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What each frame tells of its factors: precision (n, q, q), and that times z, (n, q).
+        """Precision (n, q, q) of each frame's factors by what it shows, and that times z, (n, q).
 
         Parameters
         ----------
@@ -84,11 +84,11 @@ class Factors(ArrayGroup):
             NaN: not observed.
         """
         seen = ~np.isnan(X)
-        trust = seen / self.noise
+        weight = seen / self.noise
         q = self.weights.shape[1]
         squares = (self.weights[:, :, None] * self.weights[:, None, :]).reshape(-1, q * q)
-        pull = (np.where(seen, X - self.mean, 0.0) * trust) @ self.weights
-        return (trust @ squares).reshape(-1, q, q), pull
+        pull = (np.where(seen, X - self.mean, 0.0) * weight) @ self.weights
+        return (weight @ squares).reshape(-1, q, q), pull
 
     def posterior(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n, q) and covariance (n, q, q) of each frame's factors, regardless of time."""
@@ -109,24 +109,24 @@ class Factors(ArrayGroup):
         """q, how many there are."""
         return int(self.weights.shape[1])
 
-    def with_noise(self, more: float, least: float = 0.0) -> Factors:
+    def with_noise(self, more: float, least: float = 0.0) -> MotionFactors:
         """The same with so much more (or less) noise in every column, at least so much."""
-        return Factors(self.mean, self.weights, np.maximum(self.noise + more, least))
+        return MotionFactors(self.mean, self.weights, np.maximum(self.noise + more, least))
 
-    def scaled(self, deviation: FloatArray) -> Factors:
+    def scaled(self, deviation: FloatArray) -> MotionFactors:
         """For factors measured in units of their standard deviation, (q,)."""
-        return Factors(self.mean, self.weights * deviation, self.noise)
+        return MotionFactors(self.mean, self.weights * deviation, self.noise)
 
-    def _turned(self) -> Factors:
-        """The same with factors of which an observation tells separately, the clearest first."""
+    def _turned(self) -> MotionFactors:
+        """The same with factors that are independent given a frame, the most certain first."""
         _, turn = np.linalg.eigh(self.weights.T @ (self.weights / self.noise[:, None]))
-        return Factors(self.mean, self.weights @ turn[:, ::-1], self.noise)
+        return MotionFactors(self.mean, self.weights @ turn[:, ::-1], self.noise)
 
 
 def _maximised(
     X: FloatArray, seen: BoolArray, z: FloatArray, covariance: FloatArray, least: float
-) -> Factors:
-    """Mean, weights and noise that suit the factors' posterior best; X is 0 where not seen."""
+) -> MotionFactors:
+    """Most likely mean, weights and noise given the factors' posterior; X is 0 where not seen."""
     n, q = z.shape
     moments = np.empty((n, q + 1, q + 1))
     moments[:, :q, :q] = covariance + z[:, :, None] * z[:, None, :]
@@ -141,4 +141,4 @@ def _maximised(
     noise = np.maximum(left / seen.sum(axis=0), least**2)
     root = np.linalg.cholesky(moments[:, :q, :q].mean(axis=0))  # z has unit covariance again
     weights = np.asarray(rows[:, :q] @ root, dtype=np.float64)
-    return Factors(rows[:, q].astype(np.float64), weights, noise)
+    return MotionFactors(rows[:, q].astype(np.float64), weights, noise)
