@@ -51,12 +51,7 @@ def command(
     """
     todo = plan(paths, out_dir, ending, jobs, overwrite)
     work = partial(
-        _clean,
-        model=model,
-        no_detect=no_detect,
-        sigma=sigma,
-        target=target,
-        overwrite=overwrite,
+        _clean, model=model, no_detect=no_detect, sigma=sigma, target=target, overwrite=overwrite
     )
     carry_out(todo, work, overwrite)
 

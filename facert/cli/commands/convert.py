@@ -100,9 +100,7 @@ def command(
     )
     wanted = Wanted(kind.value if kind else None, target, shapes, in_fps or fps, rig_path)
     carry_out(
-        todo,
-        partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite),
-        overwrite,
+        todo, partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite), overwrite
     )
 
 

@@ -40,8 +40,7 @@ def command(
         Path, typer.Argument(metavar="OUT", help="A mesh sequence (.h5), or morph targets (.glb).")
     ],
     map_path: Annotated[
-        Path | None,
-        file_option("--map", "The vertex of each point: chin = 1204.", metavar="TOML"),
+        Path | None, file_option("--map", "The vertex of each point: chin = 1204.", metavar="TOML")
     ] = None,
     auto: Annotated[
         bool, typer.Option("--auto", help="Each point drives the vertex nearest to it at rest.")

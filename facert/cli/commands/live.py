@@ -87,8 +87,7 @@ def command(
         ),
     ] = None,
     record: Annotated[
-        Path | None,
-        file_option("--record", "Take of what comes in: .h5, .csv, .livelink.csv."),
+        Path | None, file_option("--record", "Take of what comes in: .h5, .csv, .livelink.csv.")
     ] = None,
     frames: Annotated[
         int | None, typer.Option(min=1, help="Stop after so many; else Ctrl-C does.")

@@ -120,13 +120,7 @@ def command(
     assert character is not None
     with reading(poses or model):
         done = facert.complete_pose(
-            character,
-            given,
-            soft=soft,
-            samples=samples,
-            seed=seed,
-            start=begun,
-            hold=hold or (),
+            character, given, soft=soft, samples=samples, seed=seed, start=begun, hold=hold or ()
         )
     console.out.print(_table(done, soft))
     if output is not None:

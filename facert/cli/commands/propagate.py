@@ -31,8 +31,7 @@ def command(
     ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="Result: .h5, .csv.")],
     keys: Annotated[
-        str,
-        typer.Option(help="Key frames, as in 0,12,30; by default all that are posed."),
+        str, typer.Option(help="Key frames, as in 0,12,30; by default all that are posed.")
     ] = "",
     every: Annotated[
         int | None, typer.Option(min=1, help="Instead: every so many frames, and the last.")

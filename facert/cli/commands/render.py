@@ -38,8 +38,7 @@ def command(
         file_option("--beside", "Another face of the same frames; again for more.", metavar="FILE"),
     ] = None,
     frames: Annotated[
-        str,
-        typer.Option(help="For instance 0,30,60 for a sheet; 100..400 for a part of the take."),
+        str, typer.Option(help="For instance 0,30,60 for a sheet; 100..400 for a part of the take.")
     ] = "",
     size: Annotated[int, typer.Option(min=64, max=2048, help="Pixels of a face a side.")] = 320,
     fps: Annotated[

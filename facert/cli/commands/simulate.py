@@ -23,8 +23,7 @@ def command(
     output: Annotated[Path, typer.Argument(metavar="OUT", help="The take to write, .h5 or .csv.")],
     markers: Annotated[int, typer.Option(min=1, help="How many vertices serve as markers.")] = 40,
     vertices: Annotated[
-        str | None,
-        typer.Option(metavar="I,J,...", help="These vertices instead, counted from 0."),
+        str | None, typer.Option(metavar="I,J,...", help="These vertices instead, counted from 0.")
     ] = None,
     noise: Annotated[
         float,

@@ -38,8 +38,7 @@ def command(
     like: Annotated[
         Path | None,
         file_option(
-            "--like",
-            "A take of the same actor that was stabilised before, for the same head pose.",
+            "--like", "A take of the same actor that was stabilised before, for the same head pose."
         ),
     ] = None,
     no_detect: NO_DETECT = False,

@@ -84,9 +84,7 @@ def command(
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume",
-            help="Continue a shared model from its checkpoint.",
-            rich_help_panel=SHARED,
+            "--resume", help="Continue a shared model from its checkpoint.", rich_help_panel=SHARED
         ),
     ] = False,
     start: Annotated[

@@ -25,8 +25,7 @@ NO_SMOOTH = Annotated[bool, typer.Option("--no-smooth", help="Map every frame as
 SIGMA = Annotated[
     float | None,
     typer.Option(
-        min=0.0,
-        help="Standard deviation of the capture noise in the take's units; else estimated.",
+        min=0.0, help="Standard deviation of the capture noise in the take's units; else estimated."
     ),
 ]
 DEVICE = Annotated[
@@ -36,8 +35,7 @@ DEVICE = Annotated[
     ),
 ]
 HOST = Annotated[
-    str,
-    typer.Option("--host", help="Address of the page; 0.0.0.0 for other machines as well."),
+    str, typer.Option("--host", help="Address of the page; 0.0.0.0 for other machines as well.")
 ]
 PORT = Annotated[int, typer.Option("--port", help="Port of the page, or the next free one.")]
 
