@@ -10,6 +10,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan
+from facert.cli.shared.files import read_observed, write_beside
 from facert.cli.shared.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGMA, TARGET
 from facert.errors import reading
 
@@ -67,7 +68,6 @@ def _clean(
     overwrite: bool,
 ) -> None:
     """One take."""
-    from facert.cli.shared.cleaned_take import read_observed, write_beside
     from facert.retarget.options import RetargetOptions
 
     take = read_observed(source, target, no_detect)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,13 +16,6 @@ from facert.io.registry import listed
 if TYPE_CHECKING:
     from facert.cli.shared.conversion import Wanted
     from facert.data.changes import Changes
-
-
-class Kind(StrEnum):
-    """What to read of a file that can hold both."""
-
-    take = "take"
-    rig = "rig"
 
 
 def command(
@@ -38,7 +30,8 @@ def command(
         ),
     ],
     kind: Annotated[
-        Kind | None, typer.Option(help="What to read of a .glb that holds both; else the rig.")
+        Literal["take", "rig"] | None,
+        typer.Option(help="What to read of a .glb that holds both; else the rig."),
     ] = None,
     target: Annotated[
         str | None,
@@ -53,16 +46,18 @@ def command(
         file_option("--poses", "Labels from another file, by its column frame or by time."),
     ] = None,
     in_fps: Annotated[
-        float | None, typer.Option(min=1e-3, help="Frames a second of IN, if it does not say.")
+        float | None, typer.Option(min=1e-3, help="Frames a second of IN, if it states none.")
     ] = None,
     fps: Annotated[
         float | None, typer.Option(min=1e-3, help="Frames a second of OUT: resampled by time.")
     ] = None,
-    in_units: Annotated[str, typer.Option(help="Unit of IN, whatever it says.")] = "",
+    in_units: Annotated[str, typer.Option(help="Unit of IN, instead of the one it states.")] = "",
     units: Annotated[
         str, typer.Option(help="Unit of OUT: m, cm, mm, in or ft; numbers are converted.")
     ] = "",
-    in_up_axis: Annotated[str, typer.Option(help="The axis up in IN, whatever it says.")] = "",
+    in_up_axis: Annotated[
+        str, typer.Option(help="The axis up in IN, instead of the one it states.")
+    ] = "",
     up_axis: Annotated[str, typer.Option(help="The axis up in OUT: y, z or x; turned.")] = "",
     start_timecode: Annotated[str, typer.Option(help="Of the first frame, HH:MM:SS:FF.")] = "",
     rig_path: RIG = None,
@@ -98,7 +93,7 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(kind.value if kind else None, target, shapes, in_fps or fps, rig_path)
+    wanted = Wanted(kind, target, shapes, in_fps or fps, rig_path)
     carry_out(
         todo, partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite), overwrite
     )
@@ -110,5 +105,5 @@ def _convert(
     """One file."""
     from facert.cli.shared.conversion import convert_file
 
-    said = convert_file(source, output, wanted, changes, overwrite)
-    console.show(f"{output}: {said}")
+    content = convert_file(source, output, wanted, changes, overwrite)
+    console.show(f"{output}: {content}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, warn_of_unit
 from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
 from facert.data.text import plural
 from facert.io.registry import endings
@@ -19,14 +19,7 @@ if TYPE_CHECKING:
     from facert.errors import InputError
 
 ENDINGS = (*endings("write", "mesh sequence"), ".glb")
-
-
-class Fit(StrEnum):
-    """How points of another face are carried over."""
-
-    none = "none"
-    uniform = "uniform"
-    axes = "axes"
+Fit = Literal["none", "uniform", "axes"]
 
 
 def command(
@@ -50,7 +43,7 @@ def command(
     ] = 0,
     fit: Annotated[
         Fit, typer.Option(help="Carry over points of another face, scaled as a whole or by axis.")
-    ] = Fit.none,
+    ] = "none",
     carry: Annotated[
         bool, typer.Option("--carry", help="Parts without a point follow the face rigidly.")
     ] = False,
@@ -73,7 +66,7 @@ def command(
     in_units: Annotated[
         str | None,
         typer.Option(
-            "--in-units", help="What MESH holds, instead of what it says: m, cm, mm, in or ft."
+            "--in-units", help="Unit of MESH, instead of the one it states: m, cm, mm, in or ft."
         ),
     ] = None,
     shapes: SHAPES = None,
@@ -93,7 +86,7 @@ def command(
     from facert.topology.driving import FaceDriver, LooseParts
     from facert.topology.feature_points import Where, feature_points
 
-    _require_output(output, overwrite)
+    require_name(output, overwrite, ENDINGS)
     if auto and map_path:
         raise typer.BadParameter("give --map or --auto, not both")
     mesh, take = _in_units(read_mesh(mesh_path, shapes), in_units), read_source_file(points_path)
@@ -102,7 +95,7 @@ def command(
     )
     with reading(points_path):
         try:
-            points = feature_points(take, mesh, where, rest, fit.value)
+            points = feature_points(take, mesh, where, rest, fit)
         except InputError as error:
             raise _explained(error, mesh, take, auto, fit) from error
     loose: LooseParts = "carry" if carry else "refuse"
@@ -111,15 +104,15 @@ def command(
     sequence = MeshSequence(
         mesh, take.time, lambda frames: driver.deform(points.positions[frames]), take.fps
     )
-    said = _write(sequence, output, tolerance / 100.0, overwrite)
+    size = _write(sequence, output, tolerance / 100.0, overwrite)
     console.show(
         f"{output}: {plural(len(take), 'frame')} of {len(mesh.vertices)} vertices, "
-        f"driven by {plural(len(points.vertices), 'point')}{said}"
+        f"driven by {plural(len(points.vertices), 'point')}{size}"
     )
 
 
 def _in_units(mesh: Mesh, unit: str | None) -> Mesh:
-    """The mesh in the unit that its numbers are said to have."""
+    """The mesh in the unit that was given for its numbers."""
     from dataclasses import replace
 
     from facert.data.units import checked_unit
@@ -137,7 +130,7 @@ def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) 
     units = [in_metres(mesh.units), in_metres(take.units)]
     if None not in units and units[0] != units[1]:
         fix = f"Bring POINTS to the mesh's unit: facert convert --units {mesh.units}."
-    elif auto and fit != Fit.none:
+    elif auto and fit != "none":
         fix = (
             "--auto works for the points of this very face alone, and --fit cannot change that: it "
             "needs to know the vertices. Give them with --map (or v1204-names) instead of --auto."
@@ -146,25 +139,12 @@ def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) 
         fix = "For another face's points give --map (or v1204-names) and --fit, instead of --auto."
     else:
         fix = "For another face's points, or other units, add --fit."
-    told = f"MESH in {mesh.units or 'no unit'}, POINTS in {take.units or 'no unit'}"
-    return InputError(error.field, error.expected, f"{error.found} ({told})", fix, error.where)
-
-
-def _require_output(output: Path, overwrite: bool) -> None:
-    """Refuse a name that cannot be written to, before any work is done."""
-    from facert.errors import InputError, OutputExistsError
-
-    if output.suffix.lower() not in ENDINGS:
-        ending = repr(output.suffix) if output.suffix else "none"
-        expected = f"a name that ends in {', '.join(ENDINGS)}"
-        raise InputError("output", expected, ending, "Give another name.", where=str(output))
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
+    units_of = f"MESH in {mesh.units or 'no unit'}, POINTS in {take.units or 'no unit'}"
+    return InputError(error.field, error.expected, f"{error.found} ({units_of})", fix, error.where)
 
 
 def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bool) -> str:
-    """Write in the format of the name's ending; what there is to say about it."""
-    from facert.data.units import in_metres
+    """Write in the format of the name's ending; return how large and how far off morphs are."""
     from facert.io.glb import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
     from facert.mesh.morphs import compact_morphs
@@ -172,9 +152,7 @@ def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bo
     if output.suffix.lower() != ".glb":
         write_mesh_sequence(sequence, output, overwrite)
         return ""
-    if in_metres(sequence.neutral.units) is None:
-        told = "the mesh has no unit that is known: its numbers are written as metres; where they"
-        console.log.warning("%s are not, say so: --in-units cm", told)
+    warn_of_unit(sequence.neutral.units)
     morphs = compact_morphs(sequence, tolerance)
     write_glb(morphs, output, overwrite)
     unit = f" {sequence.neutral.units}" if sequence.neutral.units else ""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, save_json, save_picture
 from facert.cli.shared.options import DEVICE, OVERWRITE, RIG, SEED, SHAPES, TARGET, file_option
 from facert.data.ranges import parse_range
 from facert.data.text import plural
@@ -29,13 +30,6 @@ if TYPE_CHECKING:
 
 BUILT_IN = "the built-in take"
 WIDEST = 160
-
-
-class Split(StrEnum):
-    """Which frames are tested."""
-
-    random = "random"
-    block = "block"
 
 
 def command(
@@ -71,8 +65,9 @@ def command(
         float, typer.Option(help="Share of the markers to hide in test frames.")
     ] = 0.0,
     split: Annotated[
-        Split, typer.Option(help="Test on any other frames, or on other blocks of time.")
-    ] = Split.random,
+        Literal["random", "block"],
+        typer.Option(help="Test on any other frames, or on other blocks of time."),
+    ] = "random",
     across: Annotated[Path | None, file_option("--across", "Test on this take instead.")] = None,
     rig: RIG = None,
     shapes: SHAPES = None,
@@ -99,11 +94,13 @@ def command(
     facert eval facert-demo/training.h5 --methods ridge,nearest --repeats 3
     facert eval --labels 10..40 --json figures.json --plot figures.png
     """
-    _require_outputs(json_path, plot, overwrite)
-    if across is not None and split is not Split.random:
+    if json_path is not None and json_path.exists() and not overwrite:
+        raise OutputExistsError(json_path)
+    if plot is not None:
+        require_name(plot, overwrite)
+    if across is not None and split != "random":
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
-    from facert.cli.shared.pictures import save_picture
     from facert.evaluation.advice import advise
     from facert.evaluation.defaults import chosen_grid
     from facert.evaluation.figures import plot_errors
@@ -119,7 +116,7 @@ def command(
     if device != "cpu":
         find_device(device)
     settings = Settings(device=device)
-    protocol = Protocol(split.value, noise, missing, test_frames, seed)
+    protocol = Protocol(split, noise, missing, test_frames, seed)
     of_take, of_across = targets_for(target, take, across)
     with reading(take or BUILT_IN):
         problem = make_problem(
@@ -132,11 +129,12 @@ def command(
         journal = None if json_path is None else journal_beside(json_path, problem, settings)
         outcomes = _run(problem, grid, settings, jobs, journal)
     rows = summarise(outcomes, protocol)
-    title = _title(_name(take, target), across, problem, grid)
+    title = _title(take, target, across, problem, grid)
     console.out.print(_table(rows, title))
     if json_path is not None:
         files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
-        _write_json(json_path, {**_plain(files), **_facts(problem, grid)}, rows, overwrite)
+        content = {"settings": _facts(files, problem, grid), "rows": list(map(asdict, rows))}
+        save_json(content, json_path, overwrite)
     if plot is not None and all(row.rms is None for row in rows):
         console.log.warning("%s: not drawn, as no method could run", plot)
     elif plot is not None:
@@ -172,16 +170,6 @@ def _numbers(text: str | None, option: str) -> tuple[int, ...] | None:
     return None if text is None else parse_range(text, option)
 
 
-def _require_outputs(json_path: Path | None, plot: Path | None, overwrite: bool) -> None:
-    """Refuse names that cannot be written to, before hours of work are done."""
-    from facert.cli.shared.pictures import require_picture_name
-
-    if json_path is not None and json_path.exists() and not overwrite:
-        raise OutputExistsError(json_path)
-    if plot is not None:
-        require_picture_name(plot, overwrite)
-
-
 def _methods(text: str) -> tuple[str, ...]:
     """The names in the option, each once."""
     if text == "all":
@@ -201,16 +189,16 @@ def _read(path: Path | None, target: str | None) -> Take:
     return training_take(posed=None) if path is None else read_take_file(path, target=target)
 
 
-def _name(take: Path | None, target: str | None) -> str:
-    if take is None:
-        return BUILT_IN
-    return take.name if target is None else f"{take.name} ({target})"
-
-
-def _title(name: str, across: Path | None, problem: Problem, grid: Grid) -> str:
+def _title(
+    take: Path | None, target: str | None, across: Path | None, problem: Problem, grid: Grid
+) -> str:
     protocol = problem.protocol
-    tested = f"tested on {across.name}" if across is not None else f"{protocol.split} split"
-    parts = [name, tested, plural(grid.repeats, "draw")]
+    name = BUILT_IN if take is None else take.name
+    parts = [
+        name if take is None or target is None else f"{name} ({target})",
+        f"tested on {across.name}" if across is not None else f"{protocol.split} split",
+        plural(grid.repeats, "draw"),
+    ]
     if len(grid.unlabelled) == 1:
         parts.append(f"{grid.unlabelled[0]} unlabelled")
     if protocol.noise:
@@ -257,18 +245,13 @@ def _table(rows: Sequence[EvaluationRow], title: str) -> Table:
     return table
 
 
-def _plain(files: Mapping[str, Path | str | None]) -> dict[str, str | None]:
-    return {name: None if value is None else str(value) for name, value in files.items()}
-
-
-def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
+def _facts(files: Mapping[str, object], problem: Problem, grid: Grid) -> dict[str, Any]:
     """The resolved settings, for the JSON file."""
-    from dataclasses import asdict
-
     from facert.data.version import CREATED_BY
     from facert.retarget.model_file import library_versions
 
     return {
+        **{name: None if value is None else str(value) for name, value in files.items()},
         **asdict(grid),
         **asdict(problem.protocol),
         "split": "across" if problem.across else problem.protocol.split,
@@ -277,17 +260,3 @@ def _facts(problem: Problem, grid: Grid) -> dict[str, Any]:
         "created_by": CREATED_BY,
         "versions": library_versions(),
     }
-
-
-def _write_json(
-    path: Path, settings: dict[str, Any], rows: Sequence[EvaluationRow], overwrite: bool
-) -> None:
-    import json
-    from dataclasses import asdict
-
-    from facert.io.atomic import replacing
-
-    content = {"settings": settings, "rows": [asdict(row) for row in rows]}
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    with replacing(path, overwrite) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+from facert.cli.shared import console
+from facert.cli.shared.files import save_text
 from facert.cli.shared.options import OVERWRITE
 
 
-class Program(StrEnum):
-    """Programs that there is a script for."""
-
-    blender = "blender"
-    maya = "maya"
-
-
 def command(
-    program: Annotated[Program, typer.Argument(metavar="blender|maya")],
+    program: Annotated[Literal["blender", "maya"], typer.Argument(metavar="blender|maya")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write it here instead of to stdout.")
     ] = None,
@@ -33,14 +27,11 @@ def command(
     facert export-script blender -o facert_curves.py
     facert export-script maya > facert_maya.py
     """
-    from facert.cli.shared import console
-    from facert.io.atomic import replacing
     from facert.io.importers import script
 
-    text = script(program.value)
+    text = script(program)
     if output is None:
         typer.echo(text, nl=False)
         return
-    with replacing(output, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    save_text(text, output, overwrite)
     console.show(f"wrote {output}")

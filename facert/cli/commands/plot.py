@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, save_picture
 from facert.cli.shared.options import OVERWRITE, TARGET, TRUTH
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -32,12 +33,11 @@ def command(
     facert plot retargeted.h5 curves.png
     facert plot retargeted.h5 jaw.svg --controls jaw_open
     """
-    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.io.formats import read_take_file, targets_for
     from facert.render.faces import require_poses
     from facert.render.plots import plot_controls
 
-    require_picture_name(output, overwrite)
+    require_name(output, overwrite)
     ours, theirs = targets_for(target, take_path, truth_path)
     take = read_take_file(take_path, ours)
     truth = read_take_file(truth_path, theirs) if truth_path else None

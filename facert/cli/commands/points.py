@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, save_picture
 from facert.cli.shared.help import Command, Group
 from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
 from facert.data.text import plural
@@ -46,14 +47,13 @@ def suggest(
     facert points suggest facert-demo/actor.h5 -n 40
     facert points suggest facert-demo/actor.h5 -n 20 --picture points.png
     """
-    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.render.sheet import draw_points
     from facert.topology.suggested_points import suggest_points
 
     if picture is not None:
-        require_picture_name(picture, overwrite)
+        require_name(picture, overwrite)
     rig = read_rig_file(rig_path, shapes)
     with reading(rig_path):
         chosen = suggest_points(rig, count)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import save_json
 from facert.cli.shared.options import (
     ACTOR,
     DEFAULT_MODEL,
@@ -217,14 +218,9 @@ def _mark(done: CompletedPose, name: str, soft: float) -> str:
 
 def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:
     """A take with a pose a frame, or JSON."""
-    import json
+    from facert.io.formats import write_take_file
 
-    import facert
-    from facert.io.atomic import replacing
-
-    if output.suffix.lower() != ".json":
-        facert.write_take(done.as_take, output, overwrite)
-        return
-    text = json.dumps(done.as_dict, indent=2, ensure_ascii=False)
-    with replacing(output, overwrite) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    if output.suffix.lower() == ".json":
+        save_json(done.as_dict, output, overwrite)
+    else:
+        write_take_file(done.as_take, output, overwrite)

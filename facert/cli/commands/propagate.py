@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,18 +10,11 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.options import OVERWRITE, TARGET, file_option
 from facert.data.text import plural
+from facert.settings import LimitRule
 
 if TYPE_CHECKING:
     from facert.data.arrays import IntArray
     from facert.data.take import Take
-
-
-class Limits(StrEnum):
-    """What poses are clipped to."""
-
-    auto = "auto"
-    declared = "declared"
-    none = "none"
 
 
 def command(
@@ -58,12 +50,12 @@ def command(
         typer.Option(min=1, help="Directions of motion in a window.", show_default="5 or 3"),
     ] = None,
     limits: Annotated[
-        Limits,
+        LimitRule,
         typer.Option(
             help="Clip poses to: auto (declared, else the range of the key poses and old "
             "animation), declared, or none, which keeps what goes beyond."
         ),
-    ] = Limits.auto,
+    ] = "auto",
     target: TARGET = None,
     overwrite: OVERWRITE = False,
 ) -> None:
@@ -80,7 +72,7 @@ def command(
     from facert.topology.propagated_takes import Propagation, propagate_poses, propagate_positions
 
     require_output(output, overwrite, "take")
-    how = Propagation(method, window, dim, limits.value)
+    how = Propagation(method, window, dim, limits)
     if positions is None:
         take = read_take_file(source, target)
         with reading(source):

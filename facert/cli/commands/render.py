@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import PICTURES, require_name, save_picture
 from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, file_option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
+    from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.render.faces import Face
 
@@ -55,12 +57,10 @@ def command(
     facert render retargeted.h5 faces.png --rig facert-demo/character.h5
     facert render retargeted.h5 face.gif --rig facert-demo/character.h5 --size 96
     """
-    from facert.cli.shared.faces import open_face
-    from facert.cli.shared.pictures import ENDINGS, require_picture_name
     from facert.errors import reading
     from facert.io.formats import read_rig_file, targets_for
 
-    require_picture_name(output, overwrite, (*ENDINGS, *CLIP_RATES))
+    require_name(output, overwrite, (*PICTURES, *CLIP_RATES))
     wanted, others = _parse(frames), [(one, one.stem) for one in beside or []]
     others += [(truth_path, "truth")] if truth_path else []
     if len(others) >= MOST:
@@ -68,14 +68,32 @@ def command(
     rig = read_rig_file(rig_path, shapes) if rig_path else None
     ours, *theirs = targets_for(target, path, *(one for one, _ in others))
     with ExitStack() as stack, reading(path):
-        face, take = open_face(stack, path, rig, ours)
+        face, take = _open_face(stack, path, rig, ours)
         beside_it = zip(others, theirs, strict=True)
-        faces = [face] + [open_face(stack, one, rig, t, label)[0] for (one, label), t in beside_it]
+        faces = [face] + [_open_face(stack, one, rig, t, label)[0] for (one, label), t in beside_it]
         if output.suffix.lower() not in CLIP_RATES:
-            said = _sheet(faces, take, wanted, size, output, overwrite)
+            content = _sheet(faces, take, wanted, size, output, overwrite)
         else:
-            said = _clip(faces, wanted, size, fps, output, overwrite)
-    console.show(f"{output}: {said}")
+            content = _clip(faces, wanted, size, fps, output, overwrite)
+    console.show(f"{output}: {content}")
+
+
+def _open_face(
+    stack: ExitStack, path: Path, rig: Rig | None, target: str | None, label: str = ""
+) -> tuple[Face, Take | None]:
+    """A mesh sequence, or a rig in the poses of a take; and the take. The stack closes the file."""
+    from facert.errors import InputError, reading
+    from facert.io.formats import read_take_file
+    from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
+    from facert.render.faces import Face, posed_face
+
+    if holds_mesh_sequence(path):
+        return Face(label or path.stem, stack.enter_context(open_mesh_sequence(path))), None
+    take = read_take_file(path, target)
+    with reading(path):
+        if rig is None:
+            raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
+        return posed_face(take, rig, label or "character"), take
 
 
 def _sheet(
@@ -87,7 +105,6 @@ def _sheet(
     overwrite: bool,
 ) -> str:
     """Draw some frames of every face; return which."""
-    from facert.cli.shared.pictures import save_picture
     from facert.render.faces import choose_frames, outline, require_part, require_poses
     from facert.render.sheet import render_sheet
 

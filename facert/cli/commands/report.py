@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, save_text
 from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH
 from facert.data.text import plural
-from facert.errors import InputError, OutputExistsError
 
 ENDINGS = (".html", ".htm")
 
@@ -37,15 +37,11 @@ def command(
     facert report retargeted.h5 --rig facert-demo/character.h5
     facert report . -o whole-folder.html
     """
-    if output.suffix.lower() not in ENDINGS:
-        expected, found = f"a name that ends in {ENDINGS[0]}", repr(output.suffix)
-        raise InputError("output", expected, found, "Give another name.", where=str(output))
-    if output.exists() and not overwrite:
-        raise OutputExistsError(output)
+    require_name(output, overwrite, ENDINGS)
 
     from facert.io.formats import read_rig_file, read_take_file
     from facert.pages.report.folder import file_section, folder_sections
-    from facert.pages.report.page import make_report, write_report
+    from facert.pages.report.page import make_report, to_html
     from facert.pages.report.sections import Section
 
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
@@ -57,5 +53,5 @@ def command(
         else:
             sections.append(file_section(path, rig, truth))
     name = title or ", ".join(path.resolve().name for path in results)
-    write_report(make_report(name, tuple(sections)), output, overwrite)
+    save_text(to_html(make_report(name, tuple(sections))), output, overwrite)
     console.show(f"{output}: {plural(len(sections), 'section')}")

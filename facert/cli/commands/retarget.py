@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -30,17 +29,12 @@ from facert.cli.shared.options import (
 from facert.data.text import plural
 from facert.errors import reading
 
+Mode = Literal["offline", "online"]
+
 if TYPE_CHECKING:
     from facert.data.take import Take
     from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
-
-
-class Mode(StrEnum):
-    """How frames are mapped."""
-
-    offline = "offline"
-    online = "online"
 
 
 def command(
@@ -55,7 +49,7 @@ def command(
     model: MODEL = DEFAULT_MODEL,
     mode: Annotated[
         Mode, typer.Option(help="All frames at once, or one after the other as in a live stream.")
-    ] = Mode.offline,
+    ] = "offline",
     neutral: Annotated[
         str | None,
         typer.Option(
@@ -122,13 +116,13 @@ def _retarget(
     take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
     with reading(source):
-        result = retargeter.retarget(take, mode.value, options(retargeter), device)
+        result = retargeter.retarget(take, mode, options(retargeter), device)
     seconds = time.perf_counter() - began
     facert.write_take(result, output, overwrite)
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.show(f"wrote {output}")
-    _tell_error(take, result, retargeter)
+    _print_error(take, result, retargeter)
 
 
 @lru_cache(maxsize=1)
@@ -140,7 +134,7 @@ def _loaded(model: Path, _stamp: tuple[int, int]) -> Retargeter:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """What changes with a file; nothing where there is none, which reading will tell."""
+    """What changes with a file; nothing where there is none, which reading then reports."""
     try:
         found = path.stat()
     except OSError:
@@ -148,7 +142,7 @@ def _stamp(path: Path) -> tuple[int, int]:
     return found.st_mtime_ns, found.st_size
 
 
-def _tell_error(take: Take, result: Take, retargeter: Retargeter) -> None:
+def _print_error(take: Take, result: Take, retargeter: Retargeter) -> None:
     """RMS over the poses that the input held, but for those that the model was trained on."""
     from facert.data.shared_controls import shared_controls
 
@@ -160,9 +154,9 @@ def _tell_error(take: Take, result: Take, retargeter: Retargeter) -> None:
         return
     unseen = retargeter.without_known(shared.truth)
     if not len(unseen.labels):
-        console.log.info("no pose in the input that it was surely not trained on: no error to tell")
+        console.log.info("no pose in the input that it was surely not trained on: no error shown")
         return
-    # Where the input lacks controls of the model, its poses cannot be told from the known ones.
+    # Where the input lacks controls of the model, its poses may be known ones.
     trust = "" if shared.of_result else " that it was not trained on"
     _print_errors(unseen, shared.result, trust)
     if shared.told:

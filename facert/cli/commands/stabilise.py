@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.batch import require_other_file
+from facert.cli.shared.files import read_observed, require_other_file, write_beside
 from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET, file_option
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -54,7 +54,6 @@ def command(
     facert stabilise facert-demo/performance.h5 stable.h5
     facert stabilise facert-demo/performance.h5 as-first.h5 --reference 0
     """
-    from facert.cli.shared.cleaned_take import read_observed, write_beside
     from facert.io.formats import read_source_file, targets_for
     from facert.io.registry import require_output
     from facert.preprocess.head_motion import stabilise
@@ -62,7 +61,7 @@ def command(
     require_output(output, overwrite, "take")
     require_other_file(source, output, "IN")
     if like is not None and reference != "mean":
-        raise typer.BadParameter("--like and --reference both tell the head pose: give one")
+        raise typer.BadParameter("--like and --reference both choose the head pose: give one")
     ours, theirs = targets_for(target, source, like)
     pose = _frame(reference) if like is None else read_source_file(like, theirs)
     take = read_observed(source, ours, no_detect)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name, save_picture
 from facert.cli.shared.options import AS_JSON, OVERWRITE, SEED, SHAPES, TARGET, file_option
 from facert.data.text import plural
 
@@ -52,7 +53,6 @@ def command(
     """
     import json
 
-    from facert.cli.shared.pictures import require_picture_name, save_picture
     from facert.errors import reading
     from facert.io.formats import read_rig_file
     from facert.posing.suggested_frames import suggest_frames
@@ -62,7 +62,7 @@ def command(
     if rig_path is not None and sheet is None:
         raise typer.BadParameter("--rig is for the sheet: give --sheet as well")
     if sheet is not None:
-        require_picture_name(sheet, overwrite)
+        require_name(sheet, overwrite)
         if count > MAX_FRAMES:
             raise typer.BadParameter(f"a sheet shows at most {MAX_FRAMES} frames")
     rig = read_rig_file(rig_path, shapes) if rig_path is not None else None

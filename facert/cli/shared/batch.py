@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import identity, require_other_file
 from facert.errors import FacertError, InputError, OutputExistsError
+from facert.evaluation.processes import call_each, cores
 from facert.io.registry import Kind, format_of, output_format
 
 Work = Callable[[Path, Path], None]
@@ -21,15 +21,15 @@ Work = Callable[[Path, Path], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """The files to read, and what to write for each.
+    """Files to read, each with the file to write from it.
 
     Parameters
     ----------
     pairs : tuple of (Path, Path)
     many : bool
-        Whether a folder was asked for: failures are then told line by line.
+        Whether a folder was asked for: each file then has its line, whether it failed or not.
     jobs : int
-        Files at a time; 0: as many as there are processor cores.
+        Files at a time.
     """
 
     pairs: tuple[tuple[Path, Path], ...]
@@ -45,21 +45,11 @@ def plan(
     overwrite: bool,
     kinds: tuple[Kind, ...] = ("take",),
 ) -> Plan:
-    """What to do.
+    """The plan of the options: IN and OUT, or files and folders of takes for `out_dir`.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        IN and OUT; or with `out_dir` any number of files, and folders whose takes are all meant.
-    out_dir : Path or None
-        Each result goes here, named after its source.
-    ending : str, optional
-        Of the results in `out_dir`; by default ``".h5"``.
-    jobs : int, optional
-        Files at a time in `out_dir`; by default one, 0 as many as there are processor cores.
-    overwrite : bool
-    kinds : tuple of str
-        What results may be: their endings are those of a format for one of them.
+    Results there are named after their sources, with `ending`, by default ``".h5"``, which must be
+    that of a format for one of the `kinds`; `jobs` are by default 1, and 0 as many as there are
+    processor cores.
 
     Raises
     ------
@@ -70,7 +60,7 @@ def plan(
         For a single OUT that exists.
     """
     if out_dir is None:
-        return _single(paths, ending, jobs, overwrite, kinds)
+        return _single(paths, {"--ending": ending, "--jobs": jobs}, overwrite, kinds)
     if ending is not None and not ending.startswith("."):
         raise typer.BadParameter(f"write --ending with its dot: .{ending}")
     sources = [file for path in paths for file in _files(path)]
@@ -78,44 +68,53 @@ def plan(
     output_format(outputs[0], *kinds)
     twice = [name for name in outputs if outputs.count(name) > 1]
     if twice:
-        raise InputError(
-            "--out-dir", "files with a name each", f"two for {twice[0].name}", "Rename one."
-        )
-    inputs = {_identity(source) for source in sources if source.exists()}
-    lost = [name for name in outputs if name.exists() and _identity(name) in inputs]
+        expected, found = "files with a name each", f"two for {twice[0].name}"
+        raise InputError("--out-dir", expected, found, "Rename one.")
+    inputs = {identity(source) for source in sources if source.exists()}
+    lost = [name for name in outputs if name.exists() and identity(name) in inputs]
     if lost:
-        raise InputError(
-            "--out-dir", "another folder than that of the takes", str(lost[0]), "Give another."
-        )
+        expected = "another folder than that of the takes"
+        raise InputError("--out-dir", expected, str(lost[0]), "Give another.")
     out_dir.mkdir(parents=True, exist_ok=True)
-    return Plan(tuple(zip(sources, outputs, strict=True)), True, 1 if jobs is None else jobs)
+    count = 1 if jobs is None else jobs or cores()
+    return Plan(tuple(zip(sources, outputs, strict=True)), many=True, jobs=count)
 
 
 def require_kept(todo: Plan, *others: Path | None) -> None:
-    """Refuse to write a result over another file that is read with the takes.
-
-    Raises
-    ------
-    InputError
-        When a result would take the place of one of `others`.
-    """
+    """Refuse a result that would take the place of another file that is read with the takes."""
     for _, output in todo.pairs:
         for other in others:
             if other is not None:
                 require_other_file(other, output, str(other))
 
 
+def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
+    """Do it, several files at a time if asked; ends the command with status 1 if any failed."""
+    if not todo.many:
+        work(*todo.pairs[0])
+        return
+    wanted = []
+    for source, output in todo.pairs:
+        if overwrite or not output.exists():
+            wanted.append((work, source, output))
+        else:
+            console.show(f"exists  {source}: {output} is there; --overwrite makes it anew")
+    failed = 0
+    for file, error in call_each(_attempt, wanted, todo.jobs, partial(_begin, console.log.level)):
+        failed += error is not None
+        console.show(f"failed  {error}" if error else f"done    {file}")
+    if failed:
+        console.err.print(f"{failed} of {len(wanted)} files failed", style="red")
+        raise typer.Exit(1)
+
+
 def _single(
-    paths: Sequence[Path],
-    ending: str | None,
-    jobs: int | None,
-    overwrite: bool,
-    kinds: tuple[Kind, ...],
+    paths: Sequence[Path], many: dict[str, object], overwrite: bool, kinds: tuple[Kind, ...]
 ) -> Plan:
-    """One file, IN to OUT."""
+    """One file, IN to OUT, without the options for many."""
     if len(paths) != 2:
         raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
-    for option, given in (("--ending", ending), ("--jobs", jobs)):
+    for option, given in many.items():
         if given is not None:
             raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
     output_format(paths[1], *kinds)
@@ -133,64 +132,14 @@ class _SecondPathExistsError(OutputExistsError):
         return f"{super().__str__().removesuffix('.')}; for two takes, --out-dir DIR."
 
 
-def require_other_file(source: Path, output: Path, name: str) -> None:
-    """Refuse to write over what is read, whatever it is called."""
-    if source.exists() and output.exists() and _identity(source) == _identity(output):
-        fix = "Give another name: what is read would be lost."
-        raise InputError("OUT", f"another file than {name}", "the same", fix, str(output))
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    """The same for every name of a file: other spellings, symbolic and hard links."""
-    found = path.stat()
-    return found.st_dev, found.st_ino
-
-
-def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
-    """Do it, several files at a time if asked; ends the command with status 1 if any failed."""
-    if not todo.many:
-        (pair,) = todo.pairs
-        work(*pair)
-        return
-    wanted = [pair for pair in todo.pairs if overwrite or not pair[1].exists()]
-    for source, output in todo.pairs:
-        if (source, output) not in wanted:
-            _tell("exists", f"{source}: {output} is there; --overwrite makes it anew")
-    failed = 0
-    for source, error in _outcomes(wanted, work, todo.jobs):
-        failed += error is not None
-        _tell("failed" if error else "done", error or str(source))
-    if failed:
-        console.err.print(f"{failed} of {len(wanted)} files failed", style="red")
-        raise typer.Exit(1)
-
-
-def _outcomes(
-    pairs: Sequence[tuple[Path, Path]], work: Work, jobs: int
-) -> Iterator[tuple[Path, str | None]]:
-    """Each source with what went wrong, as they finish."""
-    if jobs == 1 or len(pairs) < 2:
-        for pair in pairs:
-            yield pair[0], _attempt(work, *pair)
-        return
-    # Spawned, not forked: BLAS and torch have threads of their own.
-    count = min(jobs or os.cpu_count() or 1, len(pairs))
-    with ProcessPoolExecutor(
-        count, get_context("spawn"), initializer=_begin, initargs=(console.log.level,)
-    ) as pool:
-        running = {pool.submit(_attempt, work, *pair): pair[0] for pair in pairs}
-        for done in as_completed(running):
-            yield running[done], done.result()
-
-
 def _begin(level: int) -> None:
-    """A process of its own logs as much as the first one."""
+    """Let a process of its own log as much as the first one."""
     console.configure(quiet=False, verbose=False)
     console.log.setLevel(level)
 
 
-def _attempt(work: Work, source: Path, output: Path) -> str | None:
-    """What went wrong, in one line; None when nothing did."""
+def _attempt(work: Work, source: Path, output: Path) -> tuple[Path, str | None]:
+    """The source with what went wrong, in one line; None when nothing did."""
     try:
         work(source, output)
     except FacertError as error:
@@ -200,12 +149,8 @@ def _attempt(work: Work, source: Path, output: Path) -> str | None:
     except Exception as error:  # whatever is wrong with one file, the others are done
         text = f"unexpected {type(error).__name__}: {error}"
     else:
-        return None
-    return text if str(source) in text else f"{source}: {text}"
-
-
-def _tell(status: str, text: str) -> None:
-    console.show(f"{status:7s} {text}")
+        return source, None
+    return source, text if str(source) in text else f"{source}: {text}"
 
 
 def _files(path: Path) -> list[Path]:

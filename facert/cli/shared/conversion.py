@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from facert.cli.shared.files import warn_of_unit
 from facert.data.changes import Changes, converted, in_space
 from facert.data.labelling import weights_as_poses
 from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
-from facert.data.units import in_metres
 from facert.errors import InputError, reading
 from facert.io import formats
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
 from facert.io.registry import OWN_ENDINGS, Kind, output_format, require_output, write
 from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
 from facert.render.faces import control_settings
-
-log = logging.getLogger("facert")
 
 KINDS: tuple[Kind, ...] = ("take", "rig", "morphs")
 """What a file can be converted to."""
@@ -125,9 +122,7 @@ def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:
 
 
 def _write_motion(morphs: Morphs, output: Path, overwrite: bool) -> str:
-    if in_metres(morphs.neutral.units) is None:
-        told = "the mesh has no unit that is known: its numbers are written as metres; where they"
-        log.warning("%s are not, say so: --in-units cm", told)
+    warn_of_unit(morphs.neutral.units)
     write("morphs", morphs, output, overwrite)
     error = f", off by {morphs.error:.2g} at most" if morphs.error else ""
     targets = plural(len(morphs.targets), "morph target")

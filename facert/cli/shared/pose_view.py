@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.files import require_name
 from facert.cli.shared.interrupt import interruptible
 from facert.cli.shared.options import DEFAULT_MODEL
-from facert.errors import InputError, OutputExistsError, reading
+from facert.errors import OutputExistsError, reading
 
 if TYPE_CHECKING:
     from facert.data.rig import Rig
@@ -78,9 +79,7 @@ def _require_output(output: Path, overwrite: bool) -> None:
     """Refuse names that could not be written to once an hour of posing is done."""
     from facert.io.registry import OWN_ENDINGS
 
-    if output.suffix.lower() not in OWN_ENDINGS:
-        expected, found = f"a name that ends in {OWN_ENDINGS[0]}", repr(output.suffix)
-        raise InputError("output", expected, found, "Give another name.", where=str(output))
+    require_name(output, True, OWN_ENDINGS)
     for path in (output, output.with_suffix(".safetensors")):
         if path.exists() and not overwrite:
             console.log.info("to go on from its poses: --take %s --overwrite", output)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
-from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined, Template
 
-from facert.io.atomic import replacing
 from facert.pages.report.comparison_section import comparison_section
 from facert.pages.report.sections import Fact, Report, Section
 
@@ -27,19 +25,6 @@ def make_report(title: str, sections: tuple[Section, ...]) -> Report:
 def to_html(report: Report) -> str:
     """The page; the same report gives the same text. All that came from files is escaped."""
     return _template().render(report=report)
-
-
-def write_report(report: Report, path: Path, overwrite: bool = False) -> None:
-    """Write the page.
-
-    Raises
-    ------
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
-    """
-    text = to_html(report)
-    with replacing(path, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 @cache

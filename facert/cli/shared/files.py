@@ -1,0 +1,104 @@
+"""What several commands do with files: refuse names in time, read without bad markers, write."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from facert.cli.shared import console
+from facert.errors import InputError, OutputExistsError, reading
+from facert.io.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from facert.data.take import Take
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def require_name(path: Path, overwrite: bool, endings: tuple[str, ...] = PICTURES) -> None:
+    """Refuse a name that cannot be written to, before any work is done.
+
+    Raises
+    ------
+    InputError
+        When it ends in none of `endings`.
+    OutputExistsError
+        When the file exists and `overwrite` is not set.
+    """
+    if path.suffix.lower() not in endings:
+        expected = f"a name that ends in {', '.join(endings)}"
+        found = repr(path.suffix) if path.suffix else "none"
+        raise InputError("output", expected, found, "Give another name.", where=str(path))
+    if path.exists() and not overwrite:
+        raise OutputExistsError(path)
+
+
+def require_other_file(source: Path, output: Path, name: str) -> None:
+    """Refuse to write over a file that is read, whatever it is called."""
+    if source.exists() and output.exists() and identity(source) == identity(output):
+        fix = "Give another name: what is read would be lost."
+        raise InputError("OUT", f"another file than {name}", "the same", fix, str(output))
+
+
+def identity(path: Path) -> tuple[int, int]:
+    """The same for every name of a file: other spellings, symbolic and hard links."""
+    found = path.stat()
+    return found.st_dev, found.st_ino
+
+
+def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:
+    """A take without its bad markers, unless every marker is to be taken as observed."""
+    from facert.io.formats import read_source_file
+    from facert.preprocess.faults import without_faults
+
+    take = read_source_file(path, target)
+    with reading(path):
+        return take if no_detect else without_faults(take)
+
+
+def write_beside(
+    take: Take, output: Path, overwrite: bool, beside: Mapping[str, NDArray[Any]]
+) -> None:
+    """Write a take, and beside it what only HDF5 can hold."""
+    from facert.io.formats import write_take_file
+    from facert.io.registry import OWN_ENDINGS
+    from facert.io.take import write_take
+
+    if output.suffix.lower() in OWN_ENDINGS:
+        write_take(take, output, overwrite, beside)
+        return
+    write_take_file(take, output, overwrite)
+    console.log.info("only a .h5 file would hold %s as well", " and ".join(beside))
+
+
+def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
+    """Write a figure in the format of the file's ending."""
+    with replacing(path, overwrite) as temporary:
+        figure.savefig(temporary)
+
+
+def save_json(content: object, path: Path, overwrite: bool) -> None:
+    """Write JSON for people to read as well."""
+    import json
+
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    save_text(text + "\n", path, overwrite)
+
+
+def save_text(text: str, path: Path, overwrite: bool) -> None:
+    """Write text in UTF-8."""
+    with replacing(path, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def warn_of_unit(unit: str) -> None:
+    """Note that numbers in no known unit are written as metres."""
+    from facert.data.units import in_metres
+
+    if in_metres(unit) is None:
+        text = "the mesh has no unit that is known: its numbers are written as metres; where they"
+        console.log.warning("%s are not, give theirs: --in-units cm", text)
