@@ -149,6 +149,17 @@ def unknown_options(line: str) -> list[str]:
     return [word for word in arguments if word.startswith("-") and word not in {*known, "--help"}]
 
 
+def all_options() -> set[str]:
+    """The options of all commands."""
+    found, commands = {"--help"}, [typer.main.get_command(app.app)]
+    while commands:
+        command: Any = commands.pop()
+        found |= {option for parameter in command.params for option in parameter.opts}
+        found |= {option for parameter in command.params for option in parameter.secondary_opts}
+        commands += command.commands.values() if isinstance(command, typer.core.TyperGroup) else []
+    return found
+
+
 def _resolved(line: str) -> tuple[str, Any, list[str]]:
     """Name and object of the command in a line, and its arguments."""
     name, *arguments = shlex.split(line, comments=True)

@@ -8,7 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from following import DOCS, ROOT, blocks_of, check_options, follow, stand_in, unknown_options
+from following import (
+    DOCS,
+    ROOT,
+    all_options,
+    blocks_of,
+    check_options,
+    follow,
+    stand_in,
+    unknown_options,
+)
 
 import facert
 from facert.demo.character import animate
@@ -82,6 +91,14 @@ def test_commands_that_are_not_followed_have_options_that_exist(page: Path) -> N
 def test_commands_within_the_text_exist_with_their_options(page: Path) -> None:
     for command in re.findall(r"`(facert [^`]+)`", page.read_text(encoding="utf-8")):
         assert not unknown_options(command), command
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_options_within_the_text_exist(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    spans = [span for span in re.findall(r"`([^`]+)`", text) if not span.startswith("python ")]
+    options = {option for span in spans for option in re.findall(r"(?<!\S)--[a-z][\w-]*", span)}
+    assert options <= all_options()
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
