@@ -89,7 +89,7 @@ def write_demo(folder: Path, seed: int = 0, overwrite: bool = False) -> tuple[Pa
 
 
 def _record(seconds: float, seed: int) -> Take:
-    """Let the actor perform in front of the cameras, with the truth known."""
+    """A recorded performance of the actor, with the true poses."""
     activations = acting.perform(seconds, FPS, seed)
     rig = actor_rig()
     names, vertices = marker_vertices(make_head(build.ACTOR))

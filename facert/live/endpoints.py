@@ -1,4 +1,4 @@
-"""What ``--in`` and ``--out`` name: ``livelink:11111``, ``vmc:127.0.0.1:39539``, ``csv:a.csv``."""
+"""Ends of a session as options name them: ``livelink:11111``, ``vmc:HOST:39539``, ``csv:FILE``."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def parse_input(text: str) -> Address | File:
 
 
 def parse_output(text: str) -> Address | File:
-    """The place that ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE`` names; likewise."""
+    """The place that ``KIND[:HOST][:PORT]``, ``csv:FILE`` or ``h5:FILE`` names, or ValueError."""
     ports = {kind: one.out_port for kind, one in PROTOCOLS.items() if one.out_port is not None}
     return _parse(text, ports, OUT_FILES, f"vmc:{LOOPBACK}:39539")
 

@@ -34,7 +34,7 @@ class Limits:
 
     @classmethod
     def of(cls, frames: int | None, seconds: float | None) -> Limits:
-        """Limits of which each may be None: none."""
+        """Limits from options, of which None sets none."""
         return cls(frames or math.inf, seconds or math.inf)
 
 

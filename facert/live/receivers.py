@@ -1,4 +1,4 @@
-"""Where frames come from: a UDP socket, or a take that is played in real time."""
+"""Receivers of frames: from a UDP socket, or from a take that is played in real time."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class UdpReceiver:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """The port that it listens on."""
         return int(self._socket.getsockname()[1])
 
     def wait(self, seconds: float) -> list[Frame]:
@@ -184,7 +184,7 @@ class TakeReceiver:
 
 
 def _count_seen(values: FloatArray, counters: Counters) -> bool:
-    """Whether anything was observed, which is counted."""
+    """Count a frame; return whether anything was observed in it."""
     seen = not np.isnan(values).all()
     if seen:
         counters.received += 1

@@ -1,4 +1,4 @@
-"""Where poses go: UDP packets to one address."""
+"""A sender of poses as UDP packets to one address."""
 
 from __future__ import annotations
 

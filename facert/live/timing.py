@@ -1,4 +1,4 @@
-"""When the next frame is due, and how fast a session runs."""
+"""Timing of a session: when the next frame is due, and how fast frames are mapped."""
 
 from __future__ import annotations
 

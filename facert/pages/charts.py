@@ -66,7 +66,7 @@ class Chart:
         return low - room, high + room
 
     def remove(self) -> None:
-        """Take it off the page."""
+        """Remove the chart from the page."""
         self._chart.remove()
 
     def _plot(self, server: ViserServer, name: str, curves: list[str]) -> GuiUplotHandle:

@@ -89,7 +89,7 @@ def heat() -> FloatArray:
 
 
 def _rounded_up(value: float) -> float:
-    """To the next 1, 2 or 5 times a power of ten."""
+    """The next 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(next(step for step in (1, 2, 5, 10) if step * power >= value * 0.999) * power)
 

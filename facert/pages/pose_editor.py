@@ -58,7 +58,7 @@ class PoseEditor:
 
     @property
     def from_neutral(self) -> bool:
-        """Whether nothing was there to begin with but the neutral pose."""
+        """Whether editing began at the neutral pose."""
         return self._start is None
 
     @property

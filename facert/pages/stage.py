@@ -207,7 +207,7 @@ class Stage:
             self._fit(client.camera, client.camera.position - client.camera.look_at)
 
     def _line_up(self) -> None:
-        """Each row about the middle, the next one below it."""
+        """Place each row about the middle, the next one below it."""
         rows = [[part for part in row if part.root.visible] for row in self._rows]
         widths = [0.0]
         with self._server.atomic():
@@ -222,7 +222,7 @@ class Stage:
         self._centre = CENTRE - (self._height - HEIGHT) / 2.0 * UP
 
     def _distance(self, aspect: float) -> float:
-        """From where a camera sees all rows."""
+        """Distance from which a camera sees all rows."""
         return max(self._height, self._width / aspect) / 2.0 / float(np.tan(FIELD / 2.0))
 
     def _fit(self, camera: CameraHandle, side: FloatArray) -> None:

@@ -1,4 +1,4 @@
-"""What a page shows of a performance: faces, how far off they are, and where to look."""
+"""A performance as a page shows it: faces, errors, standard deviations, and where to look."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LOOKED_AT = 48  # frames that show how far a scale goes
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """A take of poses, with what is known beside it.
+    """A take of poses, with the character and the true poses where they are known.
 
     Raises
     ------

@@ -121,7 +121,7 @@ class ViewPage(PlayedPage):
 
 
 class _Faces:
-    """Everything on the stage."""
+    """The stage of the page: the actor, the character, and the truth."""
 
     def __init__(self, server: ViserServer, performance: Performance, actor: Face | None) -> None:
         self._performance = performance

@@ -83,7 +83,7 @@ class Worker:
                 self._complain(f"{type(error).__name__}: {error}")
 
     def _next(self) -> Task | None:
-        """What to do now, or None at the end."""
+        """The next task, or None at the end."""
         with self._changed:
             self._idle = True
             self._changed.notify_all()

@@ -15,7 +15,7 @@ _Pair = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What the pixels see; n of them see the mesh, in the order of the image."""
+    """The nearest surface in each pixel; n pixels show the mesh, in the order of the image."""
 
     covered: BoolArray
     """Rows from top to bottom, (H, W)."""
