@@ -1,11 +1,18 @@
+from copy import copy
+from functools import partial
+
 import numpy as np
 import pytest
+import torch
 
 from facert.data.arrays import rms
 from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.registry import make_method
 from facert.models.gplvm import staging
+from facert.models.gplvm.source_mapping import SourceMapping
+from facert.models.gplvm.target_mapping import map_to_target
+from facert.models.kernels import KERNELS
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
@@ -102,6 +109,45 @@ def test_a_damaged_sparse_model_is_refused(name, damage, said):
         make_method(made.settings).load(arrays)
 
 
+MATERN = {"source_kernel": "matern-5/2", "target_kernel": "matern-5/2"}
+
+
+@pytest.mark.parametrize("likelihood", ["exact", "vfe"])
+@pytest.mark.parametrize("kernels", [{"source_kernel": "matern-5/2"}, MATERN])
+def test_another_kernel_learns_as_well(method, likelihood, kernels):
+    made = fitted(likelihood=likelihood, inducing=20, **kernels)
+    labelled, unlabelled = make_data()
+    prediction, usual = made.predict(unlabelled.X), method.predict(unlabelled.X)
+    assert rms(made.predict(labelled.X).Y - labelled.Y) < 0.4 * labelled.Y.std()
+    assert rms(prediction.Y - usual.Y) < 0.5 * usual.Y.std()
+    assert rms(prediction.X - unlabelled.X) < 0.2 * unlabelled.X.std()
+
+
+@pytest.mark.parametrize("likelihood", ["exact", "vfe"])
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_batch_stream_and_device_map_alike(kernel, likelihood):
+    """Without the temporal term a stream maps each frame on its own."""
+    options = {"likelihood": likelihood, "inducing": 20, "sigma_t": 1e9}
+    made = fitted(source_kernel=kernel, target_kernel=kernel, **options)
+    frames = make_data()[1].X
+    batch, there = made.predict(frames), copy(made)
+    there._set_views(made.source_, made.target_)
+    device = torch.device("cpu")
+    there.mapping_ = SourceMapping(made.source_, device)
+    there.to_poses_ = partial(map_to_target, made.target_.on(device))
+    on_device, stream = there.predict(frames), made.stream()
+    for row in range(len(frames)):
+        one = stream.step(frames[row : row + 1])
+        np.testing.assert_allclose(one.Y, batch.Y[row : row + 1], atol=1e-4)
+    for name in ("Y", "std", "X"):
+        np.testing.assert_allclose(getattr(on_device, name), getattr(batch, name), atol=1e-8)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(InputError, match=r"source_kernel: expected one of .*found 'cubic'"):
+        make_method(Settings(method="ssgplvm", source_kernel="cubic"))
+
+
 def test_three_labels_suffice(caplog):
     labelled, _ = make_data()
     data = Labelled(labelled.X[:3], labelled.Y[:3]), Unlabelled(labelled.X[:0], labelled.Y[:0])
@@ -145,6 +191,8 @@ def test_the_fingerprint_tells_runs_apart_by_data_and_by_what_shapes_the_model()
         fingerprint(optimizer="scg"),
         fingerprint(likelihood="vfe"),
         fingerprint(inducing=7),
+        fingerprint(source_kernel="matern-5/2"),
+        fingerprint(target_kernel="matern-5/2"),
         fingerprint(method="sgplvm"),
     ]
     assert len({fingerprint(), *others}) == len(others) + 1

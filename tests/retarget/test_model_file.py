@@ -119,3 +119,36 @@ def test_a_shared_model_whose_parts_do_not_fit_is_refused(shared_model, changes,
     with pytest.raises(InputError, match=message) as caught:
         facert.load(tampered(shared_model, **changes))
     assert caught.value.where == str(shared_model)
+
+
+MATERN = {"source_kernel": "matern-5/2", "target_kernel": "matern-5/2"}
+
+
+@pytest.mark.parametrize("likelihood", ["exact", "vfe"])
+@pytest.mark.parametrize("kernels", [{"source_kernel": "matern-5/2"}, MATERN])
+def test_a_model_with_another_kernel_predicts_the_same_from_its_file(
+    take, tmp_path, likelihood, kernels
+):
+    small = {"latent_dim": 3, "neighbours": 5, "max_iterations": 20, "inducing": 15}
+    made = facert.train(
+        take, Settings(method="ssgplvm", likelihood=likelihood, **kernels, **small, **QUICK)
+    )
+    made.save(tmp_path / "model.safetensors")
+    loaded = facert.load(tmp_path / "model.safetensors")
+    for mode in ("offline", "online"):
+        same_poses(loaded.retarget(take, mode), made.retarget(take, mode))
+    assert loaded.settings == made.settings
+
+
+def test_a_file_of_an_unknown_kernel_is_refused(shared, shared_model):
+    settings = {**shared.settings.as_dict(), "target_kernel": "cubic"}
+    expected = "target_kernel: expected one of squared-exponential, .*, found 'cubic'. .*install"
+    with pytest.raises(InputError, match=expected):
+        facert.load(tampered(shared_model, settings=settings))
+
+
+def test_a_file_that_names_no_kernels_has_the_papers(shared, shared_model, take):
+    settings = shared.settings.as_dict()
+    del settings["source_kernel"], settings["target_kernel"]
+    loaded = facert.load(tampered(shared_model, settings=settings))
+    same_poses(loaded.retarget(take), shared.retarget(take))
