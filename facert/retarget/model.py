@@ -36,6 +36,8 @@ class TrainedModel:
         To normalised units and back.
     figures : dict
         How training went, for people.
+    labels : int
+        Posed frames that it was trained on.
     poses : array, shape (n, P), or None
         Poses that the character is known to make, for `facert.posing`.
     motion : Motion or None
@@ -55,6 +57,7 @@ class TrainedModel:
     target_units: Normalisation
     figures: dict[str, Any]
     neutral: FloatArray
+    labels: int = 0
     poses: FloatArray | None = None
     motion: Motion | None = None
     labelled: FloatArray | None = None
@@ -65,7 +68,7 @@ class TrainedModel:
             return take
         if set(take.controls.names) != set(self.controls.names):
             return take
-        if self.figures.get("labelled frames", 0) > len(self.poses):  # not all of them are known
+        if self.labels > len(self.poses):  # not all of them were kept
             return replace(take, params=None)
         columns = [take.controls.names.index(name) for name in self.controls.names]
         seen = (take.params[:, None, columns] == self.poses[None]).all(axis=2).any(axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -34,29 +34,29 @@ def write_model(model: TrainedModel, path: Path, overwrite: bool) -> None:
     OutputExistsError
         When the file exists and `overwrite` is false.
     """
+    known = np.isfinite(model.neutral).all()  # an earlier release did not know the actor at rest
+    optional = {
+        "target.limits": model.controls.limits,
+        "target.bounds": model.bounds,
+        "target.poses": model.poses,
+        "source.neutral": model.neutral if known else None,
+        "source.labelled": model.labelled,
+    }
     arrays = {f"method.{name}": array for name, array in model.method.save().items()}
+    arrays |= {name: array for name, array in optional.items() if array is not None}
     for view, units in (("source", model.source_units), ("target", model.target_units)):
-        arrays[f"{view}.mean"] = units.mean
-        arrays[f"{view}.scale"] = np.array([units.scale])
-    if model.controls.limits is not None:
-        arrays["target.limits"] = model.controls.limits
-    if model.bounds is not None:
-        arrays["target.bounds"] = model.bounds
-    if model.poses is not None:
-        arrays["target.poses"] = model.poses
-    if np.isfinite(model.neutral).all():  # else an earlier version did not know it
-        arrays["source.neutral"] = model.neutral
-    if model.labelled is not None:
-        arrays["source.labelled"] = model.labelled
-    if model.motion is not None:
-        arrays |= {f"motion.{n}": array for n, array in model.motion.arrays.items()}
+        arrays |= {f"{view}.mean": units.mean, f"{view}.scale": np.array([units.scale])}
     metadata = {
         "format": FORMAT,
         "format_version": 1,
         "created_by": CREATED_BY,
         "versions": library_versions(),
+        "labels": model.labels,
         **model.facts,
     }
+    if model.motion is not None:
+        arrays |= {f"motion.{n}": array for n, array in model.motion.arrays.items()}
+        metadata["motion_scale"] = model.source_units.scale
     write_tensors(path, arrays, metadata, overwrite)
 
 
@@ -79,6 +79,8 @@ def read_model(path: Path, make: type[Model]) -> Model:
             controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
             bounds = Controls(controls.names, arrays.get("target.bounds")).limits
             figures = dict(metadata.get("figures", {}))
+            # Earlier releases counted the labels in the figures alone.
+            labels = int(metadata.get("labels") or figures.get("labelled frames", 0))
             source_units, target_units = (
                 Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
                 for view in ("source", "target")
@@ -101,24 +103,26 @@ def read_model(path: Path, make: type[Model]) -> Model:
             target_units=target_units,
             figures=figures,
             neutral=arrays.get("source.neutral", np.full(source_units.mean.shape, np.nan)),
+            labels=labels,
             poses=arrays.get("target.poses"),
             motion=_motion(arrays),
             labelled=arrays.get("source.labelled"),
         )
-        _check_fit(model, arrays)
+        _check_fit(model, arrays, metadata)
     return model
 
 
 def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:
-    """A take in which nothing could be told of motion leaves none."""
+    """The motion of the source; None where the frames of the take did not follow each other."""
     own = {n.removeprefix("motion."): a for n, a in arrays.items() if n.startswith("motion.")}
     if not own:
         return None
     check_axes(own, Motion.all_axes())
-    positive = [own[name] for name in ("rates", "rest", "rest_rates", "clock", "factors.noise")]
+    motion = Motion.of(own)
+    positive = (motion.rates, motion.rest, motion.rest_rates, motion.clock, motion.factors.noise)
     if not all((array > 0.0).all() for array in positive):
         raise _misfit("motion", "numbers above 0", "others")
-    return Motion.of(own)
+    return motion
 
 
 def library_versions() -> dict[str, str]:
@@ -126,7 +130,9 @@ def library_versions() -> dict[str, str]:
     return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
 
 
-def _check_fit(model: TrainedModel, arrays: Mapping[str, FloatArray]) -> None:
+def _check_fit(
+    model: TrainedModel, arrays: Mapping[str, FloatArray], metadata: Mapping[str, Any]
+) -> None:
     """Refuse a file whose parts disagree: mapping would fail, or worse, not fail."""
     kind, names = model.source_kind, model.source_names
     if kind not in get_args(SourceKind):
@@ -150,6 +156,9 @@ def _check_fit(model: TrainedModel, arrays: Mapping[str, FloatArray]) -> None:
         raise _misfit("source.neutral", f"{columns[0]} numbers", f"{model.neutral.shape}")
     if model.motion is not None and len(model.motion.rest) != columns[0]:
         raise _misfit("motion.rest", f"{columns[0]} numbers", f"{len(model.motion.rest)}")
+    unit = metadata.get("motion_scale", model.source_units.scale)  # earlier releases left it out
+    if unit != model.source_units.scale:
+        raise _misfit("motion", f"the unit of the source, {model.source_units.scale}", f"{unit}")
 
 
 def _check_rows(rows: FloatArray | None, columns: int, field: str) -> None:

@@ -69,6 +69,7 @@ def train(
         | _figures(learned, len(chosen.X_labelled), data.target_units),
         neutral=data.neutral,
         motion=None if prepared.estimate is None else prepared.estimate.motion,
+        labels=len(chosen.X_labelled),
         labelled=chosen.X_labelled,
         poses=data.kept,
     )

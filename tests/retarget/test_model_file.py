@@ -91,6 +91,8 @@ def tampered(model, **changes):
         ({"source.neutral": np.zeros(4)}, "source.neutral: expected 15 numbers"),
         ({"motion.rest": None}, "rest"),
         ({"motion.rest": np.zeros(15)}, "motion: expected numbers above 0"),
+        ({"motion_scale": 3.0}, "motion: expected the unit of the source"),
+        ({"labels": "many"}, "the metadata"),
         ({"source_names": ["a"] * 5}, "names"),
         ({"source_names": None}, "the metadata"),
         ({"source_kind": "smells"}, "source_kind"),
@@ -152,3 +154,8 @@ def test_a_file_that_names_no_kernels_has_the_papers(shared, shared_model, take)
     del settings["source_kernel"], settings["target_kernel"]
     loaded = facert.load(tampered(shared_model, settings=settings))
     same_poses(loaded.retarget(take), shared.retarget(take))
+
+
+def test_a_file_of_an_earlier_release_has_its_labels_counted_in_the_figures(model, retargeter):
+    loaded = facert.load(tampered(model, labels=None, motion_scale=None))
+    assert loaded.labels == retargeter.labels == len(retargeter.labelled)
