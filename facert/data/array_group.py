@@ -21,10 +21,7 @@ class ArrayGroup:
     them ("x" for d_x, "y" for d_y), a digit for itself: ``weights: Annotated[FloatArray, "xy"]``.
     Where a file has another name for a field, it follows: ``Annotated[FloatArray, "y", "offset"]``.
 
-    Raises
-    ------
-    InputError
-        When the arrays do not fit together.
+    Raises `InputError` when the arrays do not fit together.
     """
 
     def __post_init__(self) -> None:
@@ -77,10 +74,7 @@ class ArrayGroup:
 def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dict[str, int]:
     """The size that each letter stands for, found in the arrays; see `ArrayGroup`.
 
-    Raises
-    ------
-    InputError
-        When an array is absent or empty, or its shape is not as spelt.
+    Raises `InputError` when an array is absent or empty, or its shape is not as spelt.
     """
     sizes: dict[str, int] = {}
     for name, letters in axes.items():

@@ -17,32 +17,22 @@ from facert.errors import InputError
 
 @dataclass(frozen=True)
 class Changes:
-    """What to change; None and empty: keep it.
-
-    Parameters
-    ----------
-    names : mapping
-        From names in the file to new ones, see `renamed`.
-    poses : Poses, optional
-        Labels to add, by the frames and times of the file.
-    fps : float, optional
-        Frames a second to resample to.
-    in_units, in_up_axis : str
-        What the numbers in the file are in, whatever it states.
-    units, up_axis : str
-        What to convert them to.
-    start_timecode : str
-        ``HH:MM:SS:FF`` of the first frame, FF at the new rate.
-    """
+    """What to change; None and empty: keep it."""
 
     names: Mapping[str, str] = field(default_factory=dict)
+    """From names in the file to new ones, see `renamed`."""
     poses: Poses | None = None
+    """Labels to add, by the frames and times of the file."""
     fps: float | None = None
+    """Frames a second to resample to."""
     in_units: str = ""
-    units: str = ""
     in_up_axis: str = ""
+    """What the numbers in the file are in, whatever it states."""
+    units: str = ""
     up_axis: str = ""
+    """What to convert them to."""
     start_timecode: str = ""
+    """``HH:MM:SS:FF`` of the first frame, FF at the new rate."""
 
     @property
     def of_frames(self) -> tuple[str, ...]:
@@ -58,10 +48,7 @@ class Changes:
 def converted(found: Take | Rig, changes: Changes) -> Take | Rig:
     """The take or rig with the changes: names, then poses, then space, then time.
 
-    Raises
-    ------
-    InputError
-        For a change that cannot be made, naming its option.
+    Raises `InputError` for a change that cannot be made, naming its option.
     """
     if changes.names:
         found = renamed(found, changes.names)
@@ -102,18 +89,11 @@ def _in_time(take: Take, changes: Changes) -> Take:
 def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
     """The same take or rig with other names.
 
-    Parameters
-    ----------
-    found : Take or Rig
-    names : mapping
-        From the names in the file, in any spelling, to the new ones. Of a take the markers or
-        weights and the controls are renamed. What is not in the mapping keeps its name.
+    `names` goes from those in the file, in any spelling, to the new ones. Of a take the markers or
+    weights and the controls are renamed. What is not in the mapping keeps its name.
 
-    Raises
-    ------
-    InputError
-        For a name that the file does not have, with the nearest one that it has; for two that
-        would bear one name.
+    Raises `InputError` for a name that the file does not have, with the nearest one that it has,
+    and for two that would bear one name.
     """
     for theirs, ours in names.items():
         if not isinstance(ours, str):

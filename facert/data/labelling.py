@@ -20,29 +20,19 @@ log = logging.getLogger("facert")
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses of a character, each for a frame of a take that is still to be chosen.
-
-    Parameters
-    ----------
-    names : sequence of str, length P
-        The controls.
-    values : array, shape (n, P)
-        A row of NaN is no pose.
-    time : array, shape (n,), optional
-        Seconds in the take's time; or
-    frames : array of int, shape (n,), optional
-        the numbers of the frames, from 0.
-    limits : array, shape (P, 2), optional
-    where : str
-        The file or argument that they are from, for messages.
-    """
+    """Poses of a character, each for a frame of a take that is still to be chosen."""
 
     names: tuple[str, ...]
+    """The P controls."""
     values: FloatArray
+    """(n, P); a row of NaN is no pose."""
     time: FloatArray | None = None
+    """Seconds in the take's time, (n,); or"""
     frames: IntArray | None = None
-    limits: FloatArray | None = None
+    """the numbers of the frames, from 0, (n,)."""
+    limits: FloatArray | None = None  # (P, 2)
     where: str = "poses"
+    """The file or argument that they are from, for messages."""
 
 
 def labelled(take: Take, poses: Poses) -> Take:
@@ -51,16 +41,8 @@ def labelled(take: Take, poses: Poses) -> Take:
     By time, a pose belongs to the nearest frame, half a nominal frame away at most. Where the take
     has a pose already, the new one counts; deviations of predicted poses are dropped.
 
-    Parameters
-    ----------
-    take : Take
-    poses : Poses
-
-    Raises
-    ------
-    InputError
-        For a pose without a frame, two for one frame, no pose at all, or a take whose controls
-        are others.
+    Raises `InputError` for a pose without a frame, two for one frame, no pose at all, or a take
+    whose controls are others.
     """
     with reading(poses.where):
         poses = _known(poses)
@@ -133,10 +115,7 @@ def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:
 def poses_of(take: Take) -> Poses:
     """The poses of another take by their times; of one without poses, its weights.
 
-    Raises
-    ------
-    InputError
-        When it has markers only.
+    Raises `InputError` when it has markers only.
     """
     names, values = named_curves(take)
     limits = None if take.controls is None or take.params is None else take.controls.limits
@@ -149,10 +128,8 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
     Weights without a shape are left out, and the log names them. A frame with a weight that was
     not observed has no pose.
 
-    Raises
-    ------
-    InputError
-        When the source is markers, no weight has a shape, or no frame is observed as a whole.
+    Raises `InputError` when the source is markers, no weight has a shape, or no frame is observed
+    as a whole.
     """
     poses = poses_of(take)
     kept = [i for i, name in enumerate(poses.names) if _has_shape(name, rig)]

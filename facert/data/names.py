@@ -94,14 +94,9 @@ def nearest(name: str, candidates: Sequence[str]) -> str | None:
 
 
 class NameIndex:
-    """Where names stand in a list, whatever their spelling.
+    """Where names, all different, stand in a list, whatever their spelling.
 
     A name is found as it is spelled, or else by the one other spelling of it in the list.
-
-    Parameters
-    ----------
-    names : sequence of str
-        All different.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -116,25 +111,10 @@ class NameIndex:
 
 
 def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
-    """Where each wanted name stands among others, in any spelling.
+    """Where each wanted name stands among others, in any spelling: indices into `among`, (P,).
 
-    Parameters
-    ----------
-    wanted : sequence of str, length P
-    among : sequence of str, length D
-    field : str
-        What holds `among`, for the message, e.g. ``"/source/names"``.
-
-    Returns
-    -------
-    array of int, shape (P,)
-        Indices into `among`.
-
-    Raises
-    ------
-    InputError
-        For the first name that is not there, with the nearest one that is; for two names that
-        would stand at one place.
+    Raises `InputError` naming `field`, what holds `among`: for the first name that is not there,
+    with the nearest one that is; for two names that would stand at one place.
     """
     index = NameIndex(among)
     positions = [index.find(name) for name in wanted]
@@ -201,22 +181,10 @@ def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
     """Which of a rig's shapes each control drives, whatever the spelling of either.
 
     A control drives the shape of its name; where the rig has a left and a right half of it
-    instead, both.
+    instead, both. The result (P, K) is 1 where a control drives a shape, else 0: poses (n, P) times
+    this are settings of the rig.
 
-    Parameters
-    ----------
-    controls : sequence of str, length P
-    shapes : sequence of str, length K
-
-    Returns
-    -------
-    array, shape (P, K)
-        1 where a control drives a shape, else 0: poses (n, P) times this are settings of the rig.
-
-    Raises
-    ------
-    InputError
-        When the rig has no shape for a control, or one shape for two of them.
+    Raises `InputError` when the rig has no shape for a control, or one shape for two of them.
     """
     index = NameIndex(shapes)
     driven = [_driven(control, index) for control in controls]
@@ -257,16 +225,9 @@ def _require_one_driver(
 def control_groups(names: Sequence[str]) -> dict[str, IntArray]:
     """Sort controls into the parts of the face by the words of their names.
 
-    Parameters
-    ----------
-    names : sequence of str, length P
-        ARKit, ICT-FaceKit, MakeHuman or similar names.
-
-    Returns
-    -------
-    dict
-        From the group (brows, eyes, nose, cheeks, mouth, jaw, head, other; in this order, empty
-        ones left out) to the indices of its controls. Each control is in one group.
+    Names are as those of ARKit, ICT-FaceKit or MakeHuman. The result goes from the group (brows,
+    eyes, nose, cheeks, mouth, jaw, head, other; in this order, empty ones left out) to the indices
+    of its controls. Each control is in one group.
     """
     groups = [_group(name) for name in names]
     present = Counter(groups)

@@ -20,27 +20,18 @@ STILL = 1e-9
 
 @dataclass(frozen=True)
 class Normalisation:
-    """An affine map to normalised units.
-
-    Parameters
-    ----------
-    mean : array, shape (d,)
-        Of each dimension, in the data's units.
-    scale : float
-        The largest standard deviation of a dimension, in the data's units.
-    """
+    """An affine map to normalised units."""
 
     mean: FloatArray
+    """Of each dimension, in the data's units, (d,)."""
     scale: float
+    """The largest standard deviation of a dimension, in the data's units."""
 
     @classmethod
     def of(cls, values: FloatArray, field: str) -> Normalisation:
         """From rows (n, d); NaN is passed over.
 
-        Raises
-        ------
-        InputError
-            When nothing varies.
+        Raises `InputError` when nothing varies.
         """
         mean = np.nanmean(values, axis=0)
         scale = float(np.nanstd(values, axis=0).max())

@@ -18,19 +18,9 @@ def parse_range(text: str, option: str) -> tuple[int, ...]:
 
     Both ends of a range belong to it, whatever the step. Without a step, it is a third of the
     range, rounded to 1, 2 or 5 times a power of ten: ``10..40`` goes by tens, ``0..200`` by
-    fifties.
+    fifties. Ranges and lists may be mixed: ``"10..40,50"``.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``"10..40"``, ``"0..200:50"`` or ``"10,15,20"``; both may be mixed.
-    option : str
-        For the message, e.g. ``"--labels"``.
-
-    Raises
-    ------
-    InputError
-        For anything else.
+    Raises `InputError` naming `option`, for anything else.
     """
     expected = "a..b with a <= b, a..b:step, or numbers with commas"
     bad = InputError(option, expected, repr(text), "For instance 10..40:5.", "the options")
@@ -42,10 +32,7 @@ def parse_frames(text: str, option: str) -> tuple[int, ...]:
 
     As `parse_range`, but a range without a step has step 1.
 
-    Raises
-    ------
-    InputError
-        For anything else.
+    Raises `InputError` for anything else.
     """
     expected = "frames a..b with a <= b, or numbers with commas"
     bad = InputError(option, expected, repr(text), "For instance 0..20, or 12.", "the options")

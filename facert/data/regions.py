@@ -1,7 +1,7 @@
-"""The noun: which markers and which controls make a region of the face.
+"""Regions of the face: which markers and which controls make one.
 
 A model of the whole face takes whatever goes together in a few labels for a law: where every posed
-smile has raised brows, each smile raises them. Regions are learned apart, so that the brows hear of
+smile has raised brows, each smile raises them. Regions are learned apart, so that the brows follow
 the brows' markers alone. A control, or a marker, may belong to several.
 """
 
@@ -23,23 +23,14 @@ _KEYS = ("markers", "controls")
 class Region:
     """A part of the face, with a model of its own.
 
-    Parameters
-    ----------
-    name : str
-    markers : sequence of str
-        What it sees: names of the source's markers, or of its weights.
-    controls : sequence of str
-        What it moves.
-
-    Raises
-    ------
-    InputError
-        When it has none of either, or one of them twice.
+    Raises `InputError` when it has no marker or no control, or one of them twice.
     """
 
     name: str
     markers: tuple[str, ...]
+    """What it sees: names of the source's markers, or of its weights."""
     controls: tuple[str, ...]
+    """What it moves."""
 
     def __post_init__(self) -> None:
         for key in _KEYS:
@@ -53,17 +44,9 @@ class Region:
 
 @dataclass(frozen=True)
 class Regions:
-    """All regions of a face.
+    """All regions of a face, in the order of their names.
 
-    Parameters
-    ----------
-    parts : sequence of Region
-        In the order of their names, all different.
-
-    Raises
-    ------
-    InputError
-        When there are none, or more than `MOST`.
+    Raises `InputError` when there are none, or more than `MOST`.
     """
 
     parts: tuple[Region, ...]
@@ -78,48 +61,43 @@ class Regions:
     def of(cls, tables: Mapping[str, Any]) -> Regions:
         """From a table a region, as in a TOML file: ``{"brows": {"markers": [], "controls": []}}``.
 
-        Raises
-        ------
-        InputError
-            For anything else.
+        Raises `InputError` for anything else.
         """
         return cls(tuple(_region(name, table) for name, table in tables.items()))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the regions."""
+        """The names of the regions."""
         return tuple(part.name for part in self.parts)
 
     @property
     def tables(self) -> dict[str, dict[str, list[str]]]:
-        """What `of` takes, as plain values."""
+        """The tables that `of` takes, as plain values."""
         return {
             part.name: {"markers": list(part.markers), "controls": list(part.controls)}
             for part in self.parts
         }
 
     def matched(self, markers: Sequence[str], controls: Sequence[str]) -> Regions:
-        """These regions by the names of a take, which may spell them in another way.
+        """These regions by the markers and controls of a take, which may spell them in another way.
 
-        Parameters
-        ----------
-        markers, controls : sequence of str
-            All names of the take's source, and all of its controls. A marker may be in no region.
+        A marker may be in no region.
 
-        Raises
-        ------
-        InputError
-            For a name that the take lacks, with the nearest one that it has; for a control that is
-            in no region.
+        Raises `InputError` for a name that the take lacks, with the nearest one that it has; for a
+        control that is in no region.
         """
+        from facert.data.names import match  # NumPy, which the settings and `--help` do without
+
+        def spelled(part: Region, key: str, among: Sequence[str]) -> tuple[str, ...]:
+            found = match(getattr(part, key), among, f"regions.{part.name}.{key}")
+            return tuple(among[index] for index in found)
+
         found = Regions(
             tuple(
                 Region(
-                    part.name,
-                    _spelled(part.markers, markers, f"regions.{part.name}.markers"),
-                    _spelled(part.controls, controls, f"regions.{part.name}.controls"),
+                    one.name, spelled(one, "markers", markers), spelled(one, "controls", controls)
                 )
-                for part in self.parts
+                for one in self.parts
             )
         )
         moved = {control for part in found.parts for control in part.controls}
@@ -135,10 +113,7 @@ class Regions:
     def seen_by(self, markers: Sequence[str]) -> Regions:
         """These regions with those of their markers alone that are among the given ones.
 
-        Raises
-        ------
-        InputError
-            When a region has none left.
+        Raises `InputError` when a region has none left.
         """
         return Regions(
             tuple(
@@ -164,11 +139,3 @@ def _names(value: Any, field: str) -> tuple[str, ...]:
     if not plain or not all(isinstance(name, str) for name in value):
         raise InputError(field, "a list of names", f"{value!r}", 'Write it as ["one", "two"].')
     return tuple(value)
-
-
-def _spelled(wanted: Sequence[str], among: Sequence[str], field: str) -> tuple[str, ...]:
-    from facert.data.names import (
-        match,  # brings NumPy, which the settings and `--help` can do without
-    )
-
-    return tuple(among[index] for index in match(wanted, among, field))

@@ -36,23 +36,10 @@ def resampled(take: Take, fps: float) -> Take:
 
     A pose between frames without one goes to the new frame that is nearest to it, half a frame away
     at most; the log has how far poses moved, and those that found no frame. The start timecode
-    counts its frames at the new rate.
+    counts its frames at the new rate. Times stay where they have this rate, without pauses,
+    already.
 
-    Parameters
-    ----------
-    take : Take
-    fps : float
-        Frames a second.
-
-    Returns
-    -------
-    Take
-        `take` itself where it has this rate, without pauses, already.
-
-    Raises
-    ------
-    InputError
-        When `fps` is not positive, or there would be more than `MAX_FRAMES` frames.
+    Raises `InputError` when `fps` is not positive, or there would be more than `MAX_FRAMES` frames.
     """
     if not (np.isfinite(fps) and fps > 0):
         raise InputError("--fps", "a positive number", f"{fps}", "Give the rate of the output.")
@@ -75,10 +62,7 @@ def resampled(take: Take, fps: float) -> Take:
 def nominal_rate(time: FloatArray) -> float:
     """Frames a second by the usual spacing of the frames; whole where that is within 1 %.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        Rising seconds, with or without gaps; of anything else, or a single frame, `ONE_FRAME`.
+    Of times (T,) that do not rise, or a single frame, `ONE_FRAME`; gaps do not count.
     """
     if time.ndim != 1 or len(time) < 2 or not (time[1:] > time[:-1]).all():
         return ONE_FRAME

@@ -12,29 +12,23 @@ from facert.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class SharedControls:
-    """A truth and a result with the same controls, in the order and spelling of the result.
-
-    Parameters
-    ----------
-    truth, result : Take
-    of_truth, of_result : tuple of str
-        The controls that only one of them has: they are left out.
-    """
+    """A truth and a result with the same controls, in the order and spelling of the result."""
 
     truth: Take
     result: Take
     of_truth: tuple[str, ...] = ()
     of_result: tuple[str, ...] = ()
+    """The controls that only one of them has: they are left out."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the controls that both have."""
+        """The names of the controls that both have."""
         assert self.result.controls is not None
         return self.result.controls.names
 
     @property
-    def told(self) -> str:
-        """What is left out, in a line; empty where nothing is."""
+    def left_out(self) -> str:
+        """A line about what is left out; empty where nothing is."""
         parts = [
             f"{', '.join(names)} (only in {where})"
             for names, where in ((self.of_truth, "the truth"), (self.of_result, "the result"))
@@ -44,12 +38,9 @@ class SharedControls:
 
 
 def shared_controls(truth: Take, result: Take) -> SharedControls | None:
-    """What two takes have in common by the names of their controls, in any spelling.
+    """Two takes with the controls that they share by name, in any spelling.
 
-    Returns
-    -------
-    SharedControls or None
-        None where one has no poses, or no control has the same name.
+    None where one has no poses, or no control has the same name.
     """
     if truth.controls is None or truth.params is None:
         return None
@@ -70,12 +61,10 @@ def shared_controls(truth: Take, result: Take) -> SharedControls | None:
 
 
 def require_shared(truth: Take, result: Take, fix: str) -> SharedControls:
-    """What a result has in common with its truth.
+    """A result and its truth with the controls that they share.
 
-    Raises
-    ------
-    InputError
-        With this fix: when it is no truth of the result, by its frames or its controls.
+    Raises `InputError` with this fix: when it is no truth of the result, by its frames or its
+    controls.
     """
     if len(truth) != len(result):
         raise InputError("--truth", plural(len(result), "frame"), f"{len(truth)}", fix)

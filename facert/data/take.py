@@ -221,10 +221,7 @@ def named_columns(take: Take) -> tuple[tuple[str, ...], FloatArray]:
 def named_curves(take: Take) -> tuple[tuple[str, ...], FloatArray]:
     """Names and numbers (T, P) of the poses, or of the source weights.
 
-    Raises
-    ------
-    InputError
-        When there are only markers.
+    Raises `InputError` when there are only markers.
     """
     if take.params is None and take.source.kind == "markers":
         expected, fix = "poses or source weights", "Retarget it first, or write a .csv or .h5 file."

@@ -34,17 +34,10 @@ def has_thousandths(text: str) -> bool:
 
 
 def timecode(start: str, seconds: float, fps: float) -> str:
-    """Timecode of a frame; empty where that of the first is none.
+    """Timecode of a frame, `seconds` after the first one; empty where that of the first is none.
 
-    Parameters
-    ----------
-    start : str
-        ``HH:MM:SS:FF`` of the first frame, FF counted in `fps`; or Live Link Face's
-        ``HH:MM:SS:FF.mmm``.
-    seconds : float
-        From the first frame on.
-    fps : float
-        Frames a second; a broken rate as 29.97 counts as many frames as the next whole one.
+    `start` is ``HH:MM:SS:FF`` of the first frame, FF counted in `fps`, or Live Link Face's
+    ``HH:MM:SS:FF.mmm``. A broken rate as 29.97 counts as many frames as the next whole one.
 
     >>> timecode("01:00:00:20", 0.5, 24), timecode("10:30:05:59.500", 1 / 60, 30)
     ('01:00:01:08', '10:30:06:00.500')
@@ -72,11 +65,7 @@ def recounted(start: str, old: float, new: float) -> str:
 def parse_timecode(text: str, count: int = LIVE_LINK_RATE) -> int | None:
     """Ticks since midnight of ``HH:MM:SS:FF.mmm``; None when it is no timecode.
 
-    Parameters
-    ----------
-    text : str
-    count : int
-        How many FF make a second.
+    `count` is how many FF make a second.
     """
     parts = _parts(text)
     if parts is None or parts[1] >= count:

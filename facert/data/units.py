@@ -38,10 +38,7 @@ def with_units(found: Take | Rig, units: str) -> Take | Rig:
     Where the file does not state its unit, the numbers are taken to be in `units` already, with a
     line in the log.
 
-    Raises
-    ------
-    InputError
-        For an unknown unit, of the file or asked for.
+    Raises `InputError` for an unknown unit, of the file or asked for.
     """
     wanted = checked_unit(units, "--units")
     if not found.units:
@@ -57,10 +54,7 @@ def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
     From z to y, (x, y, z) becomes (x, z, -y). Where `present` is empty, the positions are taken
     to stand so already, with a line in the log.
 
-    Raises
-    ------
-    InputError
-        For an axis other than x, y, z.
+    Raises `InputError` for an axis other than x, y, z.
     """
     wanted = checked_axis(up_axis, "--up-axis")
     if not present:
@@ -82,10 +76,7 @@ def in_metres(units: str) -> float | None:
 def checked_unit(name: str, field: str) -> str:
     """The short name of a unit in any spelling.
 
-    Raises
-    ------
-    InputError
-        Naming `field`, for a unit that is not known.
+    Raises `InputError` naming `field`, for a unit that is not known.
     """
     short = _SPELLINGS.get(name.strip().lower(), name.strip().lower())
     if short not in METRES:
@@ -97,10 +88,7 @@ def checked_unit(name: str, field: str) -> str:
 def checked_axis(name: str, field: str) -> str:
     """``"x"``, ``"y"`` or ``"z"``.
 
-    Raises
-    ------
-    InputError
-        Naming `field`, for anything else.
+    Raises `InputError` naming `field`, for anything else.
     """
     axis = name.strip().lower().removeprefix("+")
     if axis not in _FROM_Y:

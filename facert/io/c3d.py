@@ -39,11 +39,8 @@ def read_c3d(path: Path) -> Take:
     A subject's name that all labels begin with (``Anna:LBROW``) is left out. Time counts from the
     first frame.
 
-    Raises
-    ------
-    InputError
-        Naming the file and what is at fault: no C3D file, fewer frames than it declares, no
-        labelled point, or a doubled label.
+    Raises `InputError` naming the file and what is at fault: no C3D file, fewer frames than it
+    declares, no labelled point, or a doubled label.
     """
     with reading(path), moderate_file(path).open("rb") as file, _parsing():
         if file.read(2)[1:] != bytes([_KEY]):

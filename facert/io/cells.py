@@ -37,10 +37,7 @@ class Line:
 def read_lines(path: Path, separator: str) -> list[Line]:
     """All lines of a text file, their cells stripped of blanks.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read.
+    Raises `InputError` when the file cannot be read.
     """
     return [
         Line(number, [cell.strip() for cell in line.split(separator)])
@@ -101,10 +98,7 @@ def _with_points(rows: list[Line]) -> list[Line]:
 def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
     """Check that each row has one cell a column.
 
-    Raises
-    ------
-    InputError
-        Names the first line that has not.
+    Raises `InputError` naming the first line that has not.
     """
     for row in rows:
         if len(row.cells) != len(header):
@@ -114,10 +108,7 @@ def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
 def to_numbers(rows: Sequence[Line], header: Sequence[str], columns: Sequence[int]) -> FloatArray:
     """Turn the cells of some columns into numbers, (rows, columns); a blank cell is NaN.
 
-    Raises
-    ------
-    InputError
-        Names the line and the column of the first cell that is no number.
+    Raises `InputError` naming the line and the column of the first cell that is no number.
     """
     cells = [[row.cells[column].strip() or "nan" for column in columns] for row in rows]
     try:

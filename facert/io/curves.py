@@ -32,18 +32,9 @@ _RATES = ("exportFps", "fps")
 
 
 def read_curves(path: Path, fps: float | None = None) -> Take:
-    """Read curves as a take whose source is weights.
+    """Read curves as a take whose source is weights; `fps` is for a file that does not state it.
 
-    Parameters
-    ----------
-    path : Path
-    fps : float, optional
-        Frames a second where the file does not state it.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the key that is at fault.
+    Raises `InputError` naming the file and the key that is at fault.
     """
     with reading(path):
         document = read_json_object(path)
@@ -66,12 +57,8 @@ def read_curves(path: Path, fps: float | None = None) -> Take:
 def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:
     """Write the poses of a take, or else its source weights; numbers as exact as float64 has them.
 
-    Raises
-    ------
-    InputError
-        When the take has markers and no poses.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `InputError` when the take has markers and no poses, and `OutputExistsError` when `path`
+    exists and `overwrite` is not set.
     """
     with reading(path):
         names, values = named_curves(take)
@@ -93,10 +80,7 @@ def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:
 def read_json_object(path: Path) -> dict[str, Any]:
     """The object in a JSON file.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, too large, not JSON, or holds something else.
+    Raises `InputError` when the file is missing, too large, not JSON, or holds something else.
     """
     return parse_json_object(read_text(path))
 

@@ -28,10 +28,7 @@ def read_facecap(path: Path) -> Take:
 
     Time counts from the first frame. The motion of head and eyes is left out: it has no shapes.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line that is at fault.
+    Raises `InputError` naming the file and the line that is at fault.
     """
     with reading(path):
         lines = read_lines(path, ",")

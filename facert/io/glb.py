@@ -77,12 +77,8 @@ def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
     glTF counts in metres: a mesh in a known unit is scaled by its node; of another unit or none
     the numbers stay. A single frame makes no animation: it is how the mesh is to be seen.
 
-    Raises
-    ------
-    InputError
-        When the mesh has no triangles, or the file would exceed 4 GiB, as much as GLB can hold.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `InputError` when the mesh has no triangles, or the file would exceed 4 GiB, as much as
+    GLB can hold, and `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     if not len(morphs.neutral.faces):
         raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))

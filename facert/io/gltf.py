@@ -98,10 +98,7 @@ class Document:
 def open_gltf(path: Path) -> Iterator[Document]:
     """Read a foreign glTF file; whatever goes wrong inside the block is blamed on it.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, too large, cut short, compressed, or no glTF 2.0.
+    Raises `InputError` when the file is missing, too large, cut short, compressed, or no glTF 2.0.
     """
     path = Path(path)
     with reading(path), parsing("file", "valid glTF 2.0"):

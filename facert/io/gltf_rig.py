@@ -54,10 +54,7 @@ def read_gltf_rig(path: Path) -> Rig:
     Targets of the same name belong together. Meshes without a target are left out. Exporters cut a
     vertex in several where texture or normals jump: those that share place and motion are one.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read safely, or no mesh has morph targets.
+    Raises `InputError` when the file cannot be read safely, or no mesh has morph targets.
     """
     with open_gltf(path) as document:
         parts = [_part(document, one) for one in _primitives(document) if one.targets]
@@ -72,10 +69,7 @@ def read_gltf_rig(path: Path) -> Rig:
 def read_gltf_mesh(path: Path) -> Mesh:
     """Read the meshes at rest, in metres: those with morph targets, else all; see `read_gltf_rig`.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read safely, or has no triangles.
+    Raises `InputError` when the file cannot be read safely, or has no triangles.
     """
     with open_gltf(path) as document:
         there = list(_primitives(document))

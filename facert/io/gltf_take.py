@@ -38,18 +38,10 @@ def read_gltf_take(path: Path, target: str | None = None) -> Take:
     """Read the animation of morph targets as a take whose source is weights.
 
     Every key is a frame; between keys that lie farther apart than frames, there are others, which
-    are sampled by the file's own interpolation.
+    are sampled by the file's own interpolation. `target` names one of several animations.
 
-    Parameters
-    ----------
-    path : Path
-    target : str, optional
-        Which of several animations.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read safely, or holds no animation of weights, or several.
+    Raises `InputError` when the file cannot be read safely, or holds no animation of weights, or
+    several.
     """
     with open_gltf(path) as document:
         curves = _chosen(document, target)

@@ -16,10 +16,7 @@ MAX_BYTES = 2**29
 def existing_file(path: Path) -> Path:
     """Check that `path` is a file that may be read.
 
-    Raises
-    ------
-    InputError
-        When there is nothing, a folder, or a file without permission.
+    Raises `InputError` when there is nothing, a folder, or a file without permission.
     """
     if not (path.is_file() and os.access(path, os.R_OK)):
         found = "a folder" if path.is_dir() else "no permission" if path.exists() else "nothing"
@@ -30,10 +27,7 @@ def existing_file(path: Path) -> Path:
 def moderate_file(path: Path, most: int = MAX_BYTES) -> Path:
     """Check that `path` is a file that may be read, and holds no more than `most` bytes.
 
-    Raises
-    ------
-    InputError
-        Also when it is larger.
+    Raises `InputError` also when it is larger.
     """
     size = existing_file(path).stat().st_size
     if size > most:
@@ -44,10 +38,7 @@ def moderate_file(path: Path, most: int = MAX_BYTES) -> Path:
 def read_text(path: Path) -> str:
     """Read a UTF-8 text file, with or without a byte order mark.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, too large or not UTF-8.
+    Raises `InputError` when the file is missing, too large or not UTF-8.
     """
     try:
         return moderate_file(path).read_text(encoding="utf-8-sig")
@@ -64,10 +55,7 @@ def parsing(
 
     Hostile bytes raise struct.error, KeyError, OverflowError and more, which nobody can list.
 
-    Raises
-    ------
-    InputError
-        Instead of any other exception.
+    Raises `InputError` instead of any other exception.
     """
     try:
         yield

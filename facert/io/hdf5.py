@@ -195,10 +195,7 @@ class Rows:
     def read(self, rows: IntArray) -> FloatArray:
         """Some rows, (n, ...), as float64.
 
-        Raises
-        ------
-        InputError
-            When the data are damaged.
+        Raises `InputError` when the data are damaged.
         """
         first, count = (int(rows[0]), len(rows)) if len(rows) else (0, 0)
         if np.array_equal(rows, np.arange(first, first + count)):
@@ -211,10 +208,7 @@ class Rows:
 def open_guarded(path: Path) -> Iterator[GuardedFile]:
     """Open a foreign HDF5 file for reading; errors raised inside name the file.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, is no HDF5 file, or is cut short.
+    Raises `InputError` when the file is missing, is no HDF5 file, or is cut short.
     """
     path = Path(path)
     with reading(path):
@@ -301,10 +295,7 @@ class NewRows:
 def create(path: Path, format_name: str, version: int, overwrite: bool) -> Iterator[NewFile]:
     """Make a new HDF5 file that states its format; it appears when the block ends well.
 
-    Raises
-    ------
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     with replacing(path, overwrite) as temporary, h5py.File(temporary, "w") as file:
         new = NewFile(file)

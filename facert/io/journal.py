@@ -19,15 +19,9 @@ log = logging.getLogger(__name__)
 class Journal:
     """A file to which finished work is added line by line.
 
-    Its first line states which work it belongs to. A journal of other work is begun anew; a last
-    line that was cut off is passed over.
-
-    Parameters
-    ----------
-    path : Path
-        The file. Nothing is written before `begin`.
-    fingerprint : str
-        Of the work: what must be the same for its entries to be of use.
+    Its first line has the `fingerprint` of the work it belongs to: what must be the same for its
+    entries to be of use. A journal of other work is begun anew; a last line that was cut off is
+    passed over. Nothing is written before `begin`.
     """
 
     def __init__(self, path: Path, fingerprint: str) -> None:
@@ -36,10 +30,7 @@ class Journal:
     def begin(self) -> list[dict[str, Any]]:
         """The entries that are there, of the same work; the file is ready for more.
 
-        Raises
-        ------
-        InputError
-            When the file cannot be read or written.
+        Raises `InputError` when the file cannot be read or written.
         """
         entries = self._entries()
         header = {"fingerprint": self._fingerprint}

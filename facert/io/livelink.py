@@ -54,10 +54,7 @@ def read_livelink(path: Path) -> Take:
     Rows without a face, and rows that do not come after the one before, are dropped and counted
     in the log.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line that is at fault.
+    Raises `InputError` naming the file and the line that is at fault.
     """
     with reading(path):
         header, rows = read_csv(path)
@@ -86,12 +83,8 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
     All 61 columns are written as the app does; names that the take does not have are 0. Frames
     without a pose become rows without a face.
 
-    Raises
-    ------
-    InputError
-        When the controls or weights are not ARKit's, or only a part of a frame is known.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `InputError` when the controls or weights are not ARKit's, or only a part of a frame is
+    known, and `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     with reading(path):
         ticks, columns = _ticks_and_columns(take)

@@ -39,12 +39,8 @@ class SequenceWriter:
     def append(self, vertices: FloatArray) -> None:
         """Write the next frames, vertices (n, V, 3).
 
-        Raises
-        ------
-        InputError
-            When a vertex is NaN, or too far away for float32.
-        ValueError
-            When the frames are of another mesh, or more than were announced.
+        Raises `InputError` when a vertex is NaN, or too far away for float32, and `ValueError` when
+        the frames are of another mesh, or more than were announced.
         """
         low, high = vertices.min(initial=0.0), vertices.max(initial=0.0)
         if not (-_LARGEST <= low and high <= _LARGEST):
@@ -59,26 +55,11 @@ def new_mesh_sequence(
 ) -> Iterator[SequenceWriter]:
     """Write a mesh sequence in batches; the file appears when the block ends well.
 
-    Parameters
-    ----------
-    path : Path
-    neutral : Mesh
-        Rest pose, V vertices.
-    time : array, shape (T,)
-        Seconds of all the frames that will be written.
-    fps : float
-        Nominal frames a second.
-    overwrite : bool
-        Allow to replace an existing file.
+    `neutral` is the rest pose, `time` (T,) has the seconds of all frames that will be written.
 
-    Raises
-    ------
-    InputError
-        When the time does not rise, or `path` cannot be written to.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
-    ValueError
-        When the block ends before all frames were written.
+    Raises `InputError` when the time does not rise or `path` cannot be written to,
+    `OutputExistsError` when it exists and `overwrite` is not set, and `ValueError` when the block
+    ends before all frames were written.
 
     Examples
     --------
@@ -114,10 +95,7 @@ def holds_mesh_sequence(path: Path) -> bool:
 def open_mesh_sequence(path: Path) -> Iterator[MeshSequence]:
     """Open a mesh sequence; its frames can be fetched inside the block.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the HDF5 path that is at fault.
+    Raises `InputError` naming the file and the HDF5 path that is at fault.
     """
     with open_guarded(path) as file:
         file.require_format(FORMAT, VERSION)

@@ -103,10 +103,7 @@ def _parsing(key: str) -> AbstractContextManager[None]:
 def open_archive(path: Path) -> Iterator[Archive]:
     """Open a foreign .npz file; errors raised inside name the file.
 
-    Raises
-    ------
-    InputError
-        When the file is missing or is no .npz archive.
+    Raises `InputError` when the file is missing or is no .npz archive.
     """
     with reading(path):
         existing_file(path)
@@ -126,20 +123,12 @@ def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
 
 
 def read_npz_take(path: Path, target: str | None = None, fps: float | None = None) -> Take:
-    """Read a track.
+    """Read a track; `fps` is for a file that does not state it.
 
-    Parameters
-    ----------
-    path : Path
-    target : str, optional
-        Which of several targets; one alone, or none, needs no choice. `NO_TARGET`: none of them.
-    fps : float, optional
-        Frames a second where the file does not state it.
+    `target` is one of several; one alone, or none, needs no choice, and `NO_TARGET` is none of
+    them.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the key that is at fault; the targets there are.
+    Raises `InputError` naming the file and the key that is at fault; the targets there are.
     """
     with open_archive(path) as archive:
         source = _read_source(archive)
@@ -153,10 +142,7 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
 def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
     """The targets of a track, and the controls of each; none of a rig, or where there is no file.
 
-    Raises
-    ------
-    InputError
-        When the file is no .npz archive, or names in it are damaged.
+    Raises `InputError` when the file is no .npz archive, or names in it are damaged.
     """
     if not path.is_file() or kind_of(path) == "rig":
         return {}
@@ -165,18 +151,9 @@ def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
 
 
 def read_npz_rig(path: Path, shapes: str | None = None) -> Rig:
-    """Read a rig.
+    """Read a rig; `shapes` is the KEY of ``KEY_deltas`` where there are several sets of shapes.
 
-    Parameters
-    ----------
-    path : Path
-    shapes : str, optional
-        Which of several sets of shapes: KEY of ``KEY_deltas``.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the key that is at fault; the sets of shapes there are.
+    Raises `InputError` naming the file and the key that is at fault; the sets of shapes there are.
     """
     with open_archive(path) as archive:
         sets = [key.removesuffix("_deltas") for key in archive.keys if key.endswith("_deltas")]

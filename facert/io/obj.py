@@ -26,10 +26,8 @@ MAX_VERTICES = 2**31
 def read_obj_folder(folder: Path) -> Rig:
     """Read ``neutral.obj`` and the other OBJ files of a folder, named and sorted by file name.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line that is at fault, or two meshes that do not belong together.
+    Raises `InputError` naming the file and the line that is at fault, or two meshes that do not
+    belong together.
     """
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".obj")
     neutral_file = next((path for path in files if path.stem.lower() == NEUTRAL), None)
@@ -49,10 +47,7 @@ def read_obj_folder(folder: Path) -> Rig:
 def read_obj(path: Path) -> Mesh:
     """Read the mesh of one OBJ file.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line that is at fault.
+    Raises `InputError` naming the file and the line that is at fault.
     """
     with reading(path):
         return Mesh(*_vertices_and_faces(path))

@@ -57,10 +57,7 @@ class _Element:
 def read_ply(path: Path) -> Mesh:
     """Read the mesh of a PLY file.
 
-    Raises
-    ------
-    InputError
-        Naming the file, and the line of the header or the element that is at fault.
+    Raises `InputError` naming the file, and the line of the header or the element that is at fault.
     """
     with reading(path):
         content = moderate_file(path).read_bytes()

@@ -25,11 +25,8 @@ _FRAME = "frame"
 def read_poses(path: Path, fps: float | None = None) -> Poses:
     """Read poses: of a CSV with a column ``frame``, its rows; else of a take, by their times.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read, a row names no frame, there are no poses in it, or a model
-        predicted them all.
+    Raises `InputError` when the file cannot be read, a row names no frame, there are no poses in
+    it, or a model predicted them all.
     """
     path = Path(path)
     with reading(path):

@@ -23,35 +23,24 @@ FOLDER = "/"
 
 @dataclass(frozen=True)
 class Format:
-    """One format of files; functions are named as ``"module.function"`` in `facert.io`.
-
-    Parameters
-    ----------
-    endings : tuple of str
-        In lower case; the last parts of a name.
-    read : mapping
-        The reader of each kind of thing that such a file can hold. It takes the path, and those of
-        ``target``, ``shapes`` and ``fps`` that it has parameters for.
-    write : mapping
-        The writer of each kind: it takes the thing, the path, and whether to overwrite.
-    kind_of : str
-        From the path, and the kind that was asked for or None, to what that very file holds.
-    targets : str
-        From the path to the targets of a take in it, and the controls of each.
-    about : str
-        What writes such takes, for ``--help``.
-    reads, writes : str
-        The cells of the table in the docs.
-    """
+    """One format of files; functions are named as ``"module.function"`` in `facert.io`."""
 
     endings: tuple[str, ...]
+    """In lower case; the last parts of a name."""
     read: Mapping[Kind, str] = field(default_factory=dict)
+    """The reader of each kind of thing that such a file can hold: it takes the path, and those of
+    ``target``, ``shapes`` and ``fps`` that it has parameters for."""
     write: Mapping[Kind, str] = field(default_factory=dict)
+    """The writer of each kind: it takes the thing, the path, and whether to overwrite."""
     kind_of: str = ""
+    """From the path, and the kind that was asked for or None, to what that very file holds."""
     targets: str = ""
+    """From the path to the targets of a take in it, and the controls of each."""
     about: str = ""
+    """What writes such takes, for ``--help``."""
     reads: str = ""
     writes: str = ""
+    """The cells of the table in the docs."""
 
     def functions(self, use: Use) -> Mapping[Kind, str]:
         """The names of its readers, or of its writers."""
@@ -173,35 +162,17 @@ def function(name: str) -> Callable[..., Any]:
     return found
 
 
-def output_format(path: Path, *kinds: Kind) -> Format:
-    """The format to write one of these kinds to.
-
-    Raises
-    ------
-    InputError
-        For an ending to which none of them is written.
-    """
-    found = format_of(path, "write", *kinds)
-    if found is None:
-        known, fix = (
-            ", ".join(endings("write", *kinds)),
-            "Choose a name for the output that ends so.",
-        )
-        raise InputError("output's ending", known, _ending(path), fix, where=str(path))
-    return found
-
-
 def require_output(path: Path, overwrite: bool, *kinds: Kind) -> Format:
     """The format to write one of these kinds to, found before any work is done.
 
-    Raises
-    ------
-    InputError
-        For an ending to which none of them is written.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `InputError` for an ending to which none of them is written, and `OutputExistsError` when
+    `path` exists and `overwrite` is not set.
     """
-    found = output_format(path, *kinds)
+    found = format_of(path, "write", *kinds)
+    if found is None:
+        known = ", ".join(endings("write", *kinds))
+        fix = "Choose a name for the output that ends so."
+        raise InputError("output's ending", known, _ending(path), fix, where=str(path))
     if path.exists() and not overwrite:
         raise OutputExistsError(path)
     return found
@@ -210,12 +181,8 @@ def require_output(path: Path, overwrite: bool, *kinds: Kind) -> Format:
 def write(kind: Kind, thing: object, path: Path, overwrite: bool = False) -> None:
     """Write a thing of that kind in the format of the name's ending.
 
-    Raises
-    ------
-    InputError
-        For an ending to which this kind is not written, or a thing that the format cannot hold.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `InputError` for an ending to which this kind is not written, or a thing that the format
+    cannot hold, and `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     function(require_output(path, overwrite, kind).write[kind])(thing, path, overwrite)
 

@@ -23,10 +23,7 @@ VERSION = 1
 def read_rig(path: Path) -> Rig:
     """Read a rig file.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the HDF5 path that is at fault.
+    Raises `InputError` naming the file and the HDF5 path that is at fault.
     """
     with open_guarded(path) as file:
         file.require_format(RIG_FORMAT, VERSION)
@@ -37,10 +34,7 @@ def read_rig(path: Path) -> Rig:
 def write_rig(rig: Rig, path: Path, overwrite: bool = False) -> None:
     """Write a rig file; the same rig gives the same bytes.
 
-    Raises
-    ------
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     with create(path, RIG_FORMAT, VERSION, overwrite) as file:
         file.mesh(rig.mesh)

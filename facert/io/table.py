@@ -36,16 +36,9 @@ def read_csv_take(path: Path, fps: float | None = None) -> Take:
 def read_table(path: Path, fps: float | None = None) -> Take:
     """Read a table as a take whose source is markers or weights.
 
-    Parameters
-    ----------
-    path : Path
-    fps : float, optional
-        Frames a second of a column ``frame``; a column ``time`` needs none.
+    `fps` is that of a column ``frame``; a column ``time`` needs none.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line or column that is at fault.
+    Raises `InputError` naming the file and the line or column that is at fault.
     """
     with reading(path):
         header, rows = read_csv(path)
@@ -62,10 +55,7 @@ def read_table(path: Path, fps: float | None = None) -> Take:
 def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     """Write time and the poses of a take, or else its source, as a table.
 
-    Raises
-    ------
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     names, values = named_columns(take)
     body = io.StringIO()

@@ -42,10 +42,7 @@ VERSION = 1
 def read_take(path: Path) -> Take:
     """Read a take file, written by facert or by any other program that keeps to the layout.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the HDF5 path that is at fault.
+    Raises `InputError` naming the file and the HDF5 path that is at fault.
     """
     with open_guarded(path) as file:
         file.require_format(TAKE_FORMAT, VERSION)
@@ -72,18 +69,9 @@ def write_take(
 ) -> None:
     """Write a take file; the same take gives the same bytes.
 
-    Parameters
-    ----------
-    take : Take
-    path : Path
-    overwrite : bool
-    beside : mapping, optional
-        Further arrays by their path in the file, which reading passes over.
+    `beside` has further arrays by their path in the file, which reading passes over.
 
-    Raises
-    ------
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     with create(path, TAKE_FORMAT, VERSION, overwrite) as file:
         file.attribute("fps", take.fps)

@@ -35,10 +35,7 @@ def write_tensors(
 ) -> None:
     """Write arrays and metadata to a new file, complete or not at all.
 
-    Raises
-    ------
-    OutputExistsError
-        When the file exists and `overwrite` is false.
+    Raises `OutputExistsError` when the file exists and `overwrite` is false.
     """
     contiguous = {
         name: np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()
@@ -51,18 +48,10 @@ def write_tensors(
 def read_tensors(path: Path, expected: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Arrays and metadata of a file written by `write_tensors`.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    expected : str
-        The metadata's ``format``, e.g. ``"facert-model"``.
+    `expected` is the metadata's ``format``, e.g. ``"facert-model"``.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, is no safetensors file, is truncated, holds anything but finite
-        float64 arrays, or was written in another format or a newer version.
+    Raises `InputError` when the file is missing, is no safetensors file, is truncated, holds
+    anything but finite float64 arrays, or was written in another format or a newer version.
     """
     with reading(path):
         content = _read_checked(path)

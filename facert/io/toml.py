@@ -26,16 +26,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
     """The table in a TOML file; whoever takes it checks its names and values.
 
-    Parameters
-    ----------
-    path : Path
-    example : str
-        Of what such a file holds, for the message.
-
-    Raises
-    ------
-    InputError
-        When the file is missing, too large, or not TOML.
+    Raises `InputError` with this example when the file is missing, too large, or not TOML.
     """
     with reading(path):
         try:
@@ -48,10 +39,7 @@ def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
 def read_regions(path: Path) -> Regions:
     """The regions in a file: a table a region; `Regions.matched` checks them against a take.
 
-    Raises
-    ------
-    InputError
-        When the file is missing, too large, not TOML, or holds anything else.
+    Raises `InputError` when the file is missing, too large, not TOML, or holds anything else.
     """
     with reading(path):
         return Regions.of(read_toml(path, REGIONS_EXAMPLE))

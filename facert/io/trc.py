@@ -34,10 +34,7 @@ SLACK = 0.01
 def read_trc(path: Path) -> Take:
     """Read a TRC file as a take whose source is markers, (T, M, 3) in the file's units.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the line or column that is at fault.
+    Raises `InputError` naming the file and the line or column that is at fault.
     """
     with reading(path):
         lines = read_lines(path, "\t")

@@ -26,22 +26,8 @@ def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
 
     Times are counted in frames from 0; a vertex that a shape does not move has no offset.
 
-    Parameters
-    ----------
-    morphs : Morphs
-    path : Path
-        Its ending is .usd, .usda or .usdc.
-    overwrite : bool
-        Allow to replace an existing file.
-
-    Raises
-    ------
-    FacertError
-        When usd-core is not installed.
-    InputError
-        When the mesh has no triangles.
-    OutputExistsError
-        When `path` exists and `overwrite` is not set.
+    Raises `FacertError` when usd-core is not installed, `InputError` when the mesh has no
+    triangles, and `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     Usd, UsdGeom, UsdSkel = _pxr()
     if not len(morphs.neutral.faces):

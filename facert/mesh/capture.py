@@ -100,23 +100,11 @@ def simulate_capture(
 def farthest_vertices(rig: Rig, count: int, seed: int = 0) -> IntArray:
     """Choose vertices of the neutral that are far from each other, among those that visibly move.
 
-    Farthest point sampling: the first at random, then always the one farthest from all before.
+    Farthest point sampling: the first at random, then always the one farthest from all before. The
+    vertices (count,) are in the order in which they were chosen; a smaller count gives their
+    beginning.
 
-    Parameters
-    ----------
-    rig : Rig
-    count : int
-    seed : int
-
-    Returns
-    -------
-    array of int, shape (count,)
-        Vertices, in the order in which they were chosen; a smaller count gives their beginning.
-
-    Raises
-    ------
-    InputError
-        When fewer vertices move.
+    Raises `InputError` when fewer vertices move.
     """
     reach = np.linalg.norm(rig.shapes, axis=2).max(axis=0)
     moving = np.flatnonzero(reach > VISIBLE * reach.max())

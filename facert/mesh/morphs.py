@@ -26,47 +26,27 @@ _FIRST_SIZE = 64
 
 @dataclass(frozen=True, eq=False)
 class Morphs:
-    """A mesh moved by weighted targets.
-
-    Attributes
-    ----------
-    neutral : Mesh
-    targets : array, shape (K, V, 3)
-        Displacement of every vertex when a weight is 1.
-    names : tuple of str, length K
-    weights : array, shape (T, K)
-    time : array, shape (T,)
-        Seconds.
-    error : float
-        The targets miss no vertex of the original by more, in the neutral's units.
-    fps : float
-        Nominal frames a second.
-    """
+    """A mesh moved by weighted targets."""
 
     neutral: Mesh
     targets: FloatArray
+    """Displacement of every vertex when a weight is 1, (K, V, 3)."""
     names: tuple[str, ...]
-    weights: FloatArray
+    weights: FloatArray  # (T, K)
     time: FloatArray
+    """Seconds, (T,)."""
     error: float = 0.0
+    """The targets miss no vertex of the original by more, in the neutral's units."""
     fps: float = 30.0
+    """Nominal frames a second."""
 
 
 def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0) -> Morphs:
     """A rig's own shapes, without those that stay at 0.
 
-    Parameters
-    ----------
-    rig : Rig
-    params : array, shape (T, P)
-        Rows of NaN, frames without a pose, are left out.
-    time : array, shape (T,)
-    fps : float
+    Rows of NaN in `params` (T, P), frames without a pose, are left out.
 
-    Raises
-    ------
-    InputError
-        When no frame has a pose.
+    Raises `InputError` when no frame has a pose.
     """
     posed = ~np.isnan(params).any(axis=1)
     if not posed.any():
@@ -79,17 +59,10 @@ def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0
 
 
 def compact_morphs(sequence: MeshSequence, tolerance: float = TOLERANCE, seed: int = 0) -> Morphs:
-    """A few targets that move a mesh as a dense sequence does.
+    """A few targets that move a mesh as a dense sequence does, every frame of which is finite.
 
-    Parameters
-    ----------
-    sequence : MeshSequence
-        Every frame finite.
-    tolerance : float
-        Most that a vertex of any frame may be off, as a share of the largest displacement of a
-        vertex in the sequence.
-    seed : int
-        For the random mixtures.
+    `tolerance` is how far a vertex of any frame may be off, as a share of the largest displacement
+    of a vertex in the sequence; `seed` is for the random mixtures.
     """
     size = min(_FIRST_SIZE, len(sequence))
     while True:

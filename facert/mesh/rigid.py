@@ -15,13 +15,7 @@ FLAT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """A rotation and a translation a frame: x becomes R x + t.
-
-    Parameters
-    ----------
-    rotations : array, shape (T, 3, 3)
-    translations : array, shape (T, 3)
-    """
+    """A rotation (T, 3, 3) and a translation (T, 3) a frame: x becomes R x + t."""
 
     rotations: FloatArray
     translations: FloatArray
@@ -115,12 +109,9 @@ def align(
 
 
 def determined(shape: FloatArray, seen: BoolArray) -> BoolArray:
-    """In which frames the points that are seen fix a rotation: three, not on a line, (T,).
+    """In which frames the points of a shape (m, 3) that are seen (T, m) fix a rotation, (T,).
 
-    Parameters
-    ----------
-    shape : array, shape (m, 3)
-    seen : array of bool, shape (T, m)
+    Three do that are not on a line.
     """
     count = np.maximum(seen.sum(axis=1), 1)[:, None]
     centre = seen @ shape / count

@@ -20,14 +20,14 @@ def test_what_both_have_is_compared_in_any_spelling_and_order():
     assert shared.truth.controls.names == shared.result.controls.names == ("JawOpen", "browDown_L")
     assert compare(shared.truth, shared.result).rms == 0.0
     assert (shared.of_truth, shared.of_result) == (("tongueOut",), ("sneer",))
-    assert shared.told == (
+    assert shared.left_out == (
         "not compared: tongueOut (only in the truth); sneer (only in the result)"
     )
 
 
 def test_takes_of_the_same_controls_leave_nothing_out():
     one = take(np.eye(2), ("a", "b"))
-    assert shared_controls(one, one).told == ""
+    assert shared_controls(one, one).left_out == ""
 
 
 def test_no_control_stands_for_two():

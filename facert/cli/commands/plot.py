@@ -65,6 +65,6 @@ def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Ta
         raise InputError(
             "--truth", f"poses of {lacking[0]!r}", found, "Leave it out of --controls."
         )
-    if shared.told:
-        console.log.info("%s", shared.told)
+    if shared.left_out:
+        console.log.info("%s", shared.left_out)
     return shared.result, shared.truth

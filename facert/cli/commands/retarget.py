@@ -159,8 +159,8 @@ def _print_error(take: Take, result: Take, retargeter: Retargeter) -> None:
     # Where the input lacks controls of the model, its poses may be known ones.
     trust = "" if shared.of_result else " that it was not trained on"
     _print_errors(unseen, shared.result, trust)
-    if shared.told:
-        console.log.info("%s", shared.told)
+    if shared.left_out:
+        console.log.info("%s", shared.left_out)
 
 
 def _print_errors(truth: Take, result: Take, trust: str) -> None:

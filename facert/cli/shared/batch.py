@@ -13,7 +13,7 @@ from facert.cli.shared import console
 from facert.cli.shared.files import identity, require_other_file
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.evaluation.processes import call_each, cores
-from facert.io.registry import Kind, format_of, output_format
+from facert.io.registry import Kind, format_of, require_output
 
 Work = Callable[[Path, Path], None]
 """Makes one file from another; must be picklable where there are several jobs."""
@@ -65,7 +65,7 @@ def plan(
         raise typer.BadParameter(f"write --ending with its dot: .{ending}")
     sources = [file for path in paths for file in _files(path)]
     outputs = [out_dir / (_stem(source) + (ending or ".h5")) for source in sources]
-    output_format(outputs[0], *kinds)
+    require_output(outputs[0], True, *kinds)
     twice = [name for name in outputs if outputs.count(name) > 1]
     if twice:
         expected, found = "files with a name each", f"two for {twice[0].name}"
@@ -117,7 +117,7 @@ def _single(
     for option, given in many.items():
         if given is not None:
             raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
-    output_format(paths[1], *kinds)
+    require_output(paths[1], True, *kinds)
     if paths[1].exists():
         require_other_file(paths[0], paths[1], "IN")
         if not overwrite:

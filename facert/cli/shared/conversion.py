@@ -16,7 +16,7 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io import formats
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-from facert.io.registry import OWN_ENDINGS, Kind, output_format, require_output, write
+from facert.io.registry import OWN_ENDINGS, Kind, require_output, write
 from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
 from facert.render.faces import control_settings
 
@@ -76,7 +76,7 @@ def _content(take: Take, output: Path) -> str:
 def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take | Rig:
     """The take or the rig of a file; of one with both, the take where only that makes sense."""
     kind = wanted.kind
-    no_rig = not output_format(output, *KINDS).write.keys() & {"rig", "morphs"}
+    no_rig = not require_output(output, True, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or changes.of_frames or no_rig):
         kind = "take"
     return formats.read_any(source, wanted.target, wanted.shapes, wanted.fps, kind)
@@ -87,7 +87,7 @@ def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: b
         raise InputError(
             "options", "none that change a take", "a mesh sequence", "Leave them out.", str(source)
         )
-    output_format(output, "morphs")
+    require_output(output, overwrite, "morphs")
     with open_mesh_sequence(source) as sequence:
         morphs = compact_morphs(sequence)
     return _write_motion(morphs, output, overwrite)
@@ -111,7 +111,7 @@ def _motion(take: Take, wanted: Wanted, changes: Changes) -> Morphs:
 
 
 def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:
-    if "morphs" in output_format(output, "rig", "morphs").write:
+    if "morphs" in require_output(output, overwrite, "rig", "morphs").write:
         rest = np.zeros((1, len(rig.names)))
         still = Morphs(rig.mesh, rig.shapes, rig.names, rest, np.zeros(1))
         _write_motion(still, output, overwrite)

@@ -83,7 +83,7 @@ def _with_errors(section: Section, shared: SharedControls) -> Section:
     comparison = compare(shared.truth, shared.result)
     assert comparison is not None  # they share controls and posed frames
     text = f"RMS to the truth {comparison.rms:.4f}"
-    text += f"; {shared.told}" if shared.told else ""
+    text += f"; {shared.left_out}" if shared.left_out else ""
     return replace(section, text=text, tables=(_errors(comparison),), comparison=comparison)
 
 
