@@ -1,4 +1,4 @@
-"""The interfaces of a live session: frames, counters, and the parts that frames pass through."""
+"""Frames and counters of a live session, and what a protocol's decoder and encoder do."""
 
 from __future__ import annotations
 
@@ -101,36 +101,4 @@ class Encoder(Protocol):
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """The packets of a pose (P,) at a time in seconds."""
-        ...
-
-
-class Receiver(Protocol):
-    """A source of frames."""
-
-    pattern: Take
-    """One frame of zeros: names, kind and units of the frames."""
-    fps: float | None
-    """Nominal frames a second, where it is known before."""
-    counters: Counters
-
-    @property
-    def finished(self) -> bool:
-        """Whether no more frames can come."""
-        ...
-
-    @property
-    def start_timecode(self) -> str:
-        """Timecode of the first frame, as in Live Link Face's CSV; empty when unknown."""
-        ...
-
-    def wait(self, seconds: float) -> list[Frame]:
-        """The frames that have come, oldest first; after so many seconds also none."""
-        ...
-
-    def rehearse(self) -> None:
-        """Decode the last packet once more, without consequence."""
-        ...
-
-    def close(self) -> None:
-        """Release files and sockets."""
         ...

@@ -10,8 +10,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from facert.errors import FacertError
-from facert.live.frames import Frame, Receiver
+from facert.live.frames import Frame
 from facert.live.live_model import LiveModel
+from facert.live.receivers import Receiver
 from facert.live.recording import PoseRecord, SourceRecord
 from facert.live.senders import UdpSender
 from facert.live.timing import Meter, Rhythm

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import OrderedDict
 
 from facert.live.frames import Observed
 
@@ -31,8 +31,7 @@ class Order:
         self._stamp: float | None = None
         self._ahead = 0.0
         self._disorder = 0
-        self._known: set[int] = set()
-        self._oldest: deque[int] = deque()
+        self._known: OrderedDict[int, None] = OrderedDict()
 
     def admits(self, host: str, arrived: float) -> bool:
         """Whether packets of this host are accepted now."""
@@ -66,7 +65,6 @@ class Order:
         self._host, self._sender = host, sender
         self._stamp, self._disorder = None, 0
         self._known.clear()
-        self._oldest.clear()
 
     def _is_copy(self, identity: bytes | None) -> bool:
         return identity is not None and hash(identity) in self._known
@@ -83,10 +81,9 @@ class Order:
     def _remember(self, identity: bytes | None) -> None:
         if identity is None:
             return
-        self._known.add(hash(identity))
-        self._oldest.append(hash(identity))
-        if len(self._oldest) > REMEMBERED:
-            self._known.discard(self._oldest.popleft())
+        self._known[hash(identity)] = None
+        if len(self._known) > REMEMBERED:
+            self._known.popitem(last=False)
 
     def _moment(self, stamp: float | None, arrived: float) -> float:
         """Time in the session: by the sender's clock while that goes on as time does."""

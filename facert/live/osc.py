@@ -30,13 +30,8 @@ _BUNDLE = b"#bundle\0"
 _AT_ONCE = _BUNDLE + struct.pack(">Q", 1)
 _DEEPEST = 4
 _INT = struct.Struct(">i")
-# Size in bytes and format of the arguments that have a fixed size; the empty ones have a value.
-_NUMBERS = {
-    "i": struct.Struct(">i"),
-    "f": struct.Struct(">f"),
-    "h": struct.Struct(">q"),
-    "d": struct.Struct(">d"),
-}
+# Formats of numbers, sizes in bytes of other arguments, and the values of those without any.
+_NUMBERS = {tag: struct.Struct(f">{code}") for tag, code in zip("ifhd", "ifqd", strict=True)}
 _SKIPPED = {"t": 8, "r": 4, "m": 4, "c": 4}
 _EMPTY = {"T": 1.0, "F": 0.0}
 _PASSED = "NI[]"

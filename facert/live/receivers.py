@@ -38,6 +38,18 @@ class UdpReceiver:
     listening : socket
         Bound; it is closed with this.
     decoder : Decoder
+
+    Attributes
+    ----------
+    pattern : Take
+        One frame of zeros: names, kind and units of the frames.
+    counters : Counters
+    fps : float, optional
+        Nominal frames a second, where it is known before.
+    finished : bool
+        Whether no more frames can come.
+    start_timecode : str
+        Of the first frame, as in Live Link Face's CSV; empty when unknown.
     """
 
     fps: float | None = None
@@ -63,7 +75,7 @@ class UdpReceiver:
         return int(self._socket.getsockname()[1])
 
     def wait(self, seconds: float) -> list[Frame]:
-        """The frames that have come; see `facert.live.frames.Receiver`."""
+        """The frames that have come, oldest first; after so many seconds also none."""
         frames: list[Frame] = []
         if not select.select([self._socket], [], [], seconds)[0]:
             return frames
@@ -77,7 +89,7 @@ class UdpReceiver:
         return frames
 
     def rehearse(self) -> None:
-        """See `facert.live.frames.Receiver`."""
+        """Decode the last packet once more, without consequence."""
         if self._latest:
             self._decoder.rehearse(self._latest)
 
@@ -134,7 +146,7 @@ class UdpReceiver:
 
 
 class TakeReceiver:
-    """A receiver that plays a take at the times of its frames.
+    """A receiver that plays a take at the times of its frames, like `UdpReceiver`.
 
     Parameters
     ----------
@@ -159,7 +171,7 @@ class TakeReceiver:
         return self._next == len(self._time)
 
     def wait(self, seconds: float) -> list[Frame]:
-        """The frames that are due; see `facert.live.frames.Receiver`."""
+        """The frames that are due; after so many seconds also none."""
         if self.finished:
             return []
         if math.isnan(self._began):
@@ -181,6 +193,9 @@ class TakeReceiver:
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+Receiver = UdpReceiver | TakeReceiver
 
 
 def _count_seen(values: FloatArray, counters: Counters) -> bool:

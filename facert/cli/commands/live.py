@@ -31,7 +31,7 @@ from facert.cli.shared.options import (
 
 if TYPE_CHECKING:
     from facert.live.endpoints import Address, File
-    from facert.live.frames import Receiver
+    from facert.live.receivers import Receiver
     from facert.live.senders import UdpSender
     from facert.retarget.retargeter import Retargeter
 
