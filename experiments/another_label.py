@@ -5,7 +5,7 @@
 Each draw poses so many frames of a track. The model before knows all labels but one; from it a
 second training goes on with all of them, as `train(take, start=before)` does, with its wider
 tolerance and to the end with that of the first. RMS is over frames whose pose none of them saw,
-and is told relative to training anew. Frames are taken as they are.
+and is given relative to training anew. Frames are taken as they are.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def measured(truth: Take, labels: int, seed: int) -> FloatArray:
     known = truth.params[test]
 
     def error(model: Retargeter) -> float:
-        said = model.retarget(take, options=AS_IT_IS).params
-        assert said is not None
-        return rms(said[test] - known)
+        predicted = model.retarget(take, options=AS_IT_IS).params
+        assert predicted is not None
+        return rms(predicted[test] - known)
 
     def timed(settings: Settings | None, start: Retargeter | None) -> tuple[Retargeter, float]:
         began = time.process_time()

@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 
 from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import read_track
+from experiments.tracks import middle, read_track
 from facert.data.arrays import BoolArray, FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.models.gaussian import Gaussian
@@ -76,9 +76,9 @@ def gaps(kind: str, share: float, places: FloatArray, frames: int, seed: int) ->
 
 
 def problems(track: str, frames: int) -> Iterator[Problem]:
+    """Every kind of gap, share and noise on the middle of a track."""
     markers = read_track(track, TARGETS[track][0]).source.values
-    start = max(0, (len(markers) - frames) // 2)
-    markers = markers[start : start + frames]
+    markers = markers[middle(len(markers), frames)]
     X = markers.reshape(len(markers), -1)
     truth = Normalisation.of(X, track).apply(X)
     places = np.median(markers, axis=0)
@@ -90,11 +90,13 @@ def problems(track: str, frames: int) -> Iterator[Problem]:
 
 
 def by_mean(problem: Problem) -> FloatArray:
+    """Hidden coordinates at their means."""
     X = problem.given
     return np.where(problem.hidden, np.nanmean(X, axis=0), X)
 
 
 def by_line(problem: Problem) -> FloatArray:
+    """Hidden coordinates on a line in time between those that are seen."""
     return interpolated(problem.given, problem.clock)
 
 
@@ -116,6 +118,7 @@ def _reconstruction(problem: Problem, rank: int) -> FloatArray:
 
 
 def by_conditional_gaussian(problem: Problem) -> FloatArray:
+    """Hidden coordinates at their conditional means, the others through Wiener's filter."""
     gaussian = Gaussian.of(problem.given)
     X = gaussian.fill(problem.given)
     noise = capture_noise(problem.given) ** 2

@@ -7,6 +7,7 @@ The demo's training take and performance, with `jaw_open` once as it is and once
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,8 @@ CONTROL, LARGER = "jaw_open", 30.0
 
 
 def main() -> None:
+    """Train and test with both sizes."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     take, performance = training_take(), performance_take()
     assert take.params is not None
     assert take.controls is not None

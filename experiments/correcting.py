@@ -11,6 +11,7 @@ Writes `experiments/results/posing_corrections.csv` and `.md`.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,7 +19,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import facert
-from experiments.posing import PROBLEMS, RESULTS, TUNED, Row
+from experiments.grid import RESULTS
+from experiments.posing import PROBLEMS, TUNED, Row
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import draw, read_track
 from facert import Settings, Take
@@ -38,7 +40,7 @@ class Retargeted:
     """Frames with the pose that a model gave them, its standard deviation, and the true one."""
 
     known: KnownPoses
-    said: FloatArray
+    predicted: FloatArray
     std: FloatArray
     truth: FloatArray
 
@@ -58,14 +60,14 @@ def retarget(track: Take, seed: int) -> Retargeted:
 
 def measure(frames: Retargeted) -> Iterator[Row]:
     """The error of the other controls, divided by that of leaving them as they were."""
-    worst = np.argsort(-np.abs(frames.said - frames.truth), axis=1)
+    worst = np.argsort(-np.abs(frames.predicted - frames.truth), axis=1)
     varying = np.argsort(-frames.known.poses.std(axis=0))[None].repeat(len(worst), axis=0)
     for choice, order in (("farthest off", worst), ("most varying", varying)):
         for k in (1, 2, 3):
             given = order[:, :k]
-            others = np.ones(frames.said.shape, dtype=bool)
+            others = np.ones(frames.predicted.shape, dtype=bool)
             np.put_along_axis(others, given, values=False, axis=1)
-            left = rms((frames.said - frames.truth)[others])
+            left = rms((frames.predicted - frames.truth)[others])
             poses = corrected(frames, given)
             ratios = {name: rms((poses[name] - frames.truth)[others]) / left for name in METHODS}
             yield {"corrected": k, "choice": choice, "left as it was": left} | ratios
@@ -76,13 +78,15 @@ def corrected(frames: Retargeted, given: IntArray) -> dict[str, FloatArray]:
     rng, known = np.random.default_rng(0), frames.known
     C = np.cov(known.poses, rowvar=False)
     done: dict[str, list[FloatArray]] = {name: [] for name in METHODS}
-    for said, std, truth, G in zip(frames.said, frames.std, frames.truth, given, strict=True):
+    for predicted, std, truth, G in zip(
+        frames.predicted, frames.std, frames.truth, given, strict=True
+    ):
         wanted = Given(G, truth[G])
         gain = C[:, G] @ np.linalg.pinv(C[np.ix_(G, G)])
-        done["conditional Gaussian"].append(known.clip(said + gain @ (truth - said)[G]))
+        done["conditional Gaussian"].append(known.clip(predicted + gain @ (truth - predicted)[G]))
         afresh = Completion.learn(known, G).pose(wanted, 0, rng)
         done["completed afresh"].append(afresh.pose)
-        done["facert"].append(correct(said, std, known, wanted, 0, rng).pose)
+        done["facert"].append(correct(predicted, std, known, wanted, 0, rng).pose)
     return {name: np.array(poses) for name, poses in done.items()}
 
 
@@ -106,6 +110,7 @@ def table(rows: list[Row]) -> str:
 
 def main() -> None:
     """Measure, and write the table."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     rows: list[Row] = []
     with threadpool_limits(1):
         for name, target in PROBLEMS:

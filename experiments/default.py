@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.grid import ACROSS, DEFAULT, OPTICAL, Case, begin_log, evaluate, kinds, options
-from experiments.report import markdown, write_csv, write_text
+from experiments.report import markdown, with_error, write_csv, write_text
 from experiments.verdict import Cell, common_others, judge, lead, mean_ratio
 from facert.evaluation.paired import MeanWithError, errors_by_method
 from facert.evaluation.run import Grid
@@ -164,7 +164,9 @@ def orders(problems: Groups) -> str:
         order = sorted([DEFAULT, *leads], key=lambda m: -leads[m].value if m in leads else 0.0)
         best = next(method for method in order if method != DEFAULT)
         ratio, se = np.exp(leads[best].value), leads[best].se
-        lines.append([name, " < ".join(order), f"{ratio:.3f} ± {ratio * se:.3f} ({best})"])
+        lines.append(
+            [name, " < ".join(order), f"{with_error(MeanWithError(ratio, ratio * se))} ({best})"]
+        )
     return markdown(["problem", "methods by rising RMS", f"{DEFAULT} / best other"], lines, texts=2)
 
 
@@ -180,7 +182,7 @@ def each_cell(cells: Sequence[Cell]) -> str:
                 cell.name,
                 f"{means[0]:.4f}",
                 f"{means[1]:.4f} ({best})",
-                f"{ratio.value:.3f} ± {ratio.se:.3f}",
+                with_error(ratio),
             ]
         )
     return markdown(["cell", DEFAULT, "best other", "ratio"], lines)

@@ -50,6 +50,7 @@ def deviation(markers: FloatArray) -> float:
 
 
 def spiked(markers: FloatArray, size: float, rng: np.random.Generator) -> Planted:
+    """Spikes of a size in all directions."""
     hit = rng.random(markers.shape[:2]) < SHARE
     way = rng.normal(size=markers.shape)
     way *= size * deviation(markers) / np.linalg.norm(way, axis=2, keepdims=True)
@@ -57,6 +58,7 @@ def spiked(markers: FloatArray, size: float, rng: np.random.Generator) -> Plante
 
 
 def held(markers: FloatArray, frames: int, rng: np.random.Generator) -> Planted:
+    """Markers held where they were for so many frames."""
     result = markers.copy()
     for _ in range(RUNS):
         start, marker = rng.integers(1, len(markers) - frames - 1), rng.integers(markers.shape[1])
@@ -66,6 +68,7 @@ def held(markers: FloatArray, frames: int, rng: np.random.Generator) -> Planted:
 
 
 def exchanged(markers: FloatArray, frames: int, rng: np.random.Generator) -> Planted:
+    """Markers exchanged with a near one for so many frames."""
     result, bad = markers.copy(), np.zeros(markers.shape[:2], dtype=np.bool_)
     for _ in range(EXCHANGES):
         start, one = rng.integers(1, len(markers) - frames - 1), rng.integers(markers.shape[1])
@@ -78,6 +81,7 @@ def exchanged(markers: FloatArray, frames: int, rng: np.random.Generator) -> Pla
 
 
 def planted(markers: FloatArray, seed: int = 0) -> Iterator[Planted]:
+    """Every kind and size of fault, and none."""
     rng = np.random.default_rng(seed)
     whole = np.ones(markers.shape[:2], dtype=np.bool_)
     yield Planted("none", "-", markers, ~whole, whole)
@@ -92,6 +96,7 @@ def planted(markers: FloatArray, seed: int = 0) -> Iterator[Planted]:
 
 
 def takes(names: list[str]) -> Iterator[tuple[str, FloatArray]]:
+    """Takes by their names, with their markers."""
     for name in names:
         if name in RAW:
             take = facert.read_take(DATA / "markers" / f"{name}.npz")
@@ -101,6 +106,7 @@ def takes(names: list[str]) -> Iterator[tuple[str, FloatArray]]:
 
 
 def measure(name: str, markers: FloatArray, noise: float) -> Iterator[dict[str, object]]:
+    """A line of the table for every fault."""
     noisy = np.random.default_rng(1).normal(size=markers.shape) * noise * deviation(markers)
     for case in planted(markers + noisy):
         found = find_faults(Source(case.markers, [f"{i}" for i in range(markers.shape[1])])).any

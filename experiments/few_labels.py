@@ -67,6 +67,7 @@ class Scores:
 
 
 def score(name: str, target: str, labels: int, unlabelled: int, repeats: int) -> Scores:
+    """The errors of all methods on so many draws of a track."""
     truth = read_track(name, target)
     assert truth.params is not None
     rows = []

@@ -65,7 +65,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for people."""
         noise = f", noise {self.noise:g}" if self.noise else ""
         return f"{self.track}, {self.target}{noise}"
 
@@ -76,7 +76,7 @@ class Case:
         return KEPT / f"{'-'.join(map(str, parts))}.jsonl"
 
     def problem(self) -> Problem:
-        """Read what it is about."""
+        """The data of the problem."""
         across = self.split == "across"
         return make_problem(
             read_track(self.track, self.target),
@@ -162,22 +162,28 @@ def _file_of(module: str) -> Path | None:
     return next((place for place in places if inside and place.exists()), None)
 
 
-def options(text: str | None, repeats: int) -> argparse.ArgumentParser:
-    """A parser with the options that all experiments on grids have."""
+def basic_options(text: str | None, repeats: int) -> argparse.ArgumentParser:
+    """A parser with the options of every experiment on tracks."""
     parser = argparse.ArgumentParser(
         description=text, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--tracks", nargs="+", choices=TARGETS, default=list(TARGETS))
-    parser.add_argument("--methods", nargs="+", choices=REGISTRY, default=list(REGISTRY))
     parser.add_argument("--repeats", type=int, default=repeats, help="draws (%(default)s)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
-    parser.add_argument("--test-frames", type=int, help="at most; by default all others")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder (%(default)s)")
     return parser
 
 
-def begin_log() -> None:
-    """Say on stderr how far it is."""
+def options(text: str | None, repeats: int) -> argparse.ArgumentParser:
+    """A parser with the options that all experiments on grids have."""
+    parser = basic_options(text, repeats)
+    parser.add_argument("--methods", nargs="+", choices=REGISTRY, default=list(REGISTRY))
+    parser.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
+    parser.add_argument("--test-frames", type=int, help="at most; by default all others")
+    return parser
+
+
+def begin_log(log: logging.Logger = log) -> None:
+    """Log progress on stderr."""
     logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
     log.setLevel(logging.INFO)
 

@@ -24,6 +24,7 @@ from threadpoolctl import threadpool_limits
 
 import facert
 from experiments.drawing import save
+from experiments.grid import RESULTS
 from experiments.report import markdown, write_csv, write_text
 from experiments.tracks import DATA, draw, read_track
 from facert import Settings, Take
@@ -61,7 +62,6 @@ PICTURED = (
 TESTED = 250
 MOVES = 1e-3  # least standard deviation of a control that may be given
 EXACT = 1e-4  # variance of the given controls in the latent model
-RESULTS = Path(__file__).parent / "results"
 OURS, CALIBRATION = "facert", "error / std"
 Row = dict[str, str | int | float]
 
@@ -76,7 +76,7 @@ class Problem:
 
     @property
     def rest(self) -> IntArray:
-        """The others."""
+        """The other controls."""
         return np.setdiff1d(np.arange(self.known.shape[1]), self.given)
 
     @property
@@ -100,7 +100,7 @@ def mean_of_nearest(count: int) -> Predict:
 
 
 def conditional_gaussian(problem: Problem) -> FloatArray:
-    """Of the known poses' mean and covariance."""
+    """The conditional mean of the Gaussian with the known poses' mean and covariance."""
     given, rest, values = problem.parts
     centred = given - given.mean(axis=0)
     C = centred.T @ centred / len(given)

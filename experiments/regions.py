@@ -9,7 +9,7 @@ learns the face as a whole, and with `--regions auto`.
 
 *Mouth alone*: test frames whose brow controls are within 0.03 of rest (root mean square), and whose
 mouth and jaw are further from it than in half of the take. There the error of the brows and their
-activity, root mean square from rest, tell what the mouth does to them. Rest is the median pose.
+activity, root mean square from rest, show what the mouth does to them. Rest is the median pose.
 Frames are drawn one by one and have no neighbours in time: nothing is smoothed or detected.
 Finished cells are kept in build/cells.
 """
@@ -26,9 +26,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import facert
-from experiments.grid import KEPT, OPTICAL, RESULTS, TARGETS, kinds
-from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import read_track
+from experiments.grid import KEPT, OPTICAL, basic_options, begin_log, kinds
+from experiments.report import markdown, mean_with_error, with_error, write_csv, write_text
+from experiments.tracks import part, read_track
 from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.names import control_groups
@@ -58,17 +58,17 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for people."""
         noise = f", noise {self.noise:g}" if self.noise else ""
         return f"{self.track}, {self.target}{noise}, {self.labels} {self.choice} labels"
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Of one draw: RMS of all controls, of brows and of the mouth; and what brows do alone.
+    """Scores of one draw: RMS of all controls, brows and mouth; and what the brows do alone.
 
     `error`, `activity` and `truth` are of the brows in frames in which the mouth alone moves: RMS
-    of their error, and from rest as said and as in truth; nan where there is no such frame.
+    of their error, and from rest as predicted and in truth; nan where there is no such frame.
     """
 
     rms: float
@@ -126,25 +126,19 @@ def measure(face: Face, case: Case, regions: str | None, seed: int) -> Scores:
     matrix = face.take.source.matrix
     noisy = matrix + noise * rng.standard_normal(matrix.shape)
     rows = np.union1d(labels, frames)
-    known = np.where(np.isin(rows, labels)[:, None], face.poses[rows], np.nan)
-    given = replace(_part(face.take, noisy, rows), params=known, animation=face.poses[poses])
+    take = replace(face.take, source=face.take.source.with_matrix(noisy))
     settings = Settings(method=case.method, seed=seed, regions=regions, smooth=False, detect=False)
-    result = train(given, settings).retarget(_part(face.take, noisy, test), options=AS_IT_IS)
+    model = train(part(take, rows, labels, poses), settings)
+    result = model.retarget(part(take, test), options=AS_IT_IS)
     assert result.params is not None
     return _scores(face, result.params, test)
 
 
-def _part(take: Take, matrix: FloatArray, rows: IntArray) -> Take:
-    """Some frames without poses."""
-    source = take.source.with_matrix(matrix[rows])
-    return replace(take, time=take.time[rows], source=source, params=None, animation=None)
-
-
-def _scores(face: Face, said: FloatArray, test: IntArray) -> Scores:
-    errors = said - face.poses[test]
+def _scores(face: Face, predicted: FloatArray, test: IntArray) -> Scores:
+    errors = predicted - face.poses[test]
     alone = np.isin(test, face.mouth_alone(test))
     brows = np.ix_(alone, face.brows)
-    moved, true = said - face.rest, face.poses[test] - face.rest
+    moved, true = predicted - face.rest, face.poses[test] - face.rest
 
     def size(values: FloatArray) -> float:
         return rms(values) if values.size else float("nan")
@@ -215,8 +209,7 @@ def cells(given: argparse.Namespace) -> Iterator[Cell]:
                     journal.add({**kept, "scores": _plain(done[key])})
                 scores[way].append(done[key])
         cell = Cell(case, scores[WHOLE], scores[APART])
-        ratio = cell.ratio("rms")
-        log.info("%s, %s: %s", case.method, case.name, _told(ratio))
+        log.info("%s, %s: %s", case.method, case.name, _ratio(cell))
         yield cell
 
 
@@ -233,8 +226,9 @@ def _numbers(values: dict[str, float | None]) -> dict[str, float]:
     return {name: float("nan") if value is None else value for name, value in values.items()}
 
 
-def _told(ratio: MeanWithError | None) -> str:
-    return "" if ratio is None else f"{ratio.value:.3f} ± {ratio.se:.3f}"
+def _ratio(cell: Cell) -> str:
+    ratio = cell.ratio("rms")
+    return "" if ratio is None else with_error(ratio)
 
 
 def summary(found: Sequence[Cell]) -> str:
@@ -252,20 +246,12 @@ def summary(found: Sequence[Cell]) -> str:
         line = [method, name, f"{better} of {len(some)}"]
         for score in ("rms", "brows", "mouth", "error"):
             ratios = [ratio for cell in some if (ratio := cell.ratio(score)) is not None]
-            line.append(_mean(ratios))
+            line.append(mean_with_error(ratios))
         line += [_mean_of(some, way, "activity") for way in (WHOLE, APART)]
         lines.append([*line, _mean_of(some, WHOLE, "truth")])
     header = ["method", "labels", "better", "RMS", "brows", "mouth", "brows, mouth alone"]
     header += ["activity, whole", "activity, regions", "in truth"]
     return markdown(header, lines, texts=2)
-
-
-def _mean(ratios: Sequence[MeanWithError]) -> str:
-    """Mean ratio, with the error that those of the cells leave it."""
-    if not ratios:
-        return ""
-    se = np.sqrt(np.sum([ratio.se**2 for ratio in ratios])) / len(ratios)
-    return f"{np.mean([ratio.value for ratio in ratios]):.3f} ± {se:.3f}"
 
 
 def _mean_of(some: Sequence[Cell], way: str, score: str) -> str:
@@ -279,7 +265,7 @@ def each(found: Sequence[Cell]) -> str:
     for cell in found:
         line = [cell.case.method, cell.case.name]
         line += [f"{cell.values(way, 'rms').mean():.4f}" for way in (WHOLE, APART)]
-        line += [_told(cell.ratio("rms"))]
+        line += [_ratio(cell)]
         for score in ("error", "activity"):
             line += [_mean_of([cell], way, score) for way in (WHOLE, APART)]
         lines.append([*line, _mean_of([cell], WHOLE, "truth")])
@@ -302,11 +288,11 @@ def write(found: Sequence[Cell], given: argparse.Namespace) -> None:
     """Tables and the CSV file of as many cells as there are."""
     parts = [
         "# Regions against the whole face",
-        f"Written by `python -m experiments.regions`, which tells what is measured: {len(found)} of"
-        f" {len(cases(given))} cells, {given.repeats} draws each. Ratios are of the error in"
-        " regions to that of the whole face: below 1, regions are better. *Better*: cells whose"
-        " mean RMS is lower. *Mouth alone*: the brows' error where the mouth alone moves;"
-        " *activity*: how far they are from rest there.",
+        "Written by `python -m experiments.regions`, which describes what is measured:"
+        f" {len(found)} of {len(cases(given))} cells, {given.repeats} draws each."
+        " Ratios are of the error in regions to that of the whole face: below 1, regions are"
+        " better. *Better*: cells whose mean RMS is lower. *Mouth alone*: the brows' error where"
+        " the mouth alone moves; *activity*: how far they are from rest there.",
         summary(found),
         "## Cell by cell",
         each(found),
@@ -316,16 +302,10 @@ def write(found: Sequence[Cell], given: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--tracks", nargs="+", choices=TARGETS, default=list(TARGETS))
+    parser = basic_options(__doc__, repeats=10)
     parser.add_argument("--methods", nargs="+", default=["auto", "ssgplvm"])
-    parser.add_argument("--repeats", type=int, default=10)
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder (%(default)s)")
     given = parser.parse_args()
-    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    log.setLevel(logging.INFO)
+    begin_log(log)
     found: list[Cell] = []
     with threadpool_limits(1):
         for cell in cells(given):

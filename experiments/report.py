@@ -6,6 +6,9 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from facert.evaluation.paired import MeanWithError
 from facert.io.atomic import replacing
 
 
@@ -13,6 +16,19 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 
     """A table whose first columns are text and whose others are numbers."""
     rules = ["---"] * texts + ["---:"] * (len(header) - texts)
     return "\n".join(f"| {' | '.join(row)} |" for row in (header, rules, *rows)) + "\n"
+
+
+def with_error(found: MeanWithError) -> str:
+    """A number with its standard error."""
+    return f"{found.value:.3f} ± {found.se:.3f}"
+
+
+def mean_with_error(found: Sequence[MeanWithError]) -> str:
+    """The mean of some numbers and its standard error from theirs; empty for no numbers."""
+    if not found:
+        return ""
+    se = float(np.sqrt(np.sum([one.se**2 for one in found]))) / len(found)
+    return with_error(MeanWithError(float(np.mean([one.value for one in found])), se))
 
 
 def write_text(path: Path, parts: Sequence[str]) -> None:

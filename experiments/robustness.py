@@ -33,7 +33,7 @@ from experiments import cleaning
 from experiments.drawing import save
 from experiments.grid import OPTICAL, RESULTS, SPEECH, TARGETS
 from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import draw, read_track
+from experiments.tracks import draw, middle, read_track
 from facert import Settings, Take
 from facert.data.arrays import FloatArray, IntArray, rms
 from facert.data.normalisation import Normalisation
@@ -101,8 +101,7 @@ class Spoilt:
 def spoil(cell: Cell) -> Spoilt:
     """The middle of a track with noise and gaps, and a few of its poses."""
     whole = read_track(cell.track, cell.target)
-    start = max(0, (len(whole) - cell.frames) // 2)
-    rows = slice(start, start + cell.frames)
+    rows = middle(len(whole), cell.frames)
     assert whole.params is not None
     source = whole.source.with_matrix(whole.source.matrix[rows])
     truth = replace(whole, time=whole.time[rows], source=source, params=whole.params[rows])
@@ -150,7 +149,7 @@ def motion(cell: Cell) -> dict[str, object]:
     """Online against offline: error, jitter, and the height of peaks.
 
     The clean run, to which peaks are compared, is that of the same model on markers without noise;
-    what learning from noise costs is told apart, by a model that never met any.
+    what learning from noise costs is measured apart, by a model that never met any.
     """
     logging.disable(logging.WARNING)
     with threadpool_limits(1):
@@ -326,7 +325,7 @@ def main() -> None:
         "# Robustness",
         f"{', '.join(options.tracks)}, all targets; the middle {options.frames} frames; {LABELS} "
         f"labels, {POSES} other poses; {options.repeats} draws. "
-        "`python -m experiments.robustness` says what is compared.",
+        "`python -m experiments.robustness` describes what is compared.",
         "## Poses",
         table(records, ""),
         verdict(records, ""),

@@ -13,15 +13,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from experiments.grid import OPTICAL, RESULTS, TARGETS, begin_log, kinds, log
-from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import read_track
+from experiments.grid import OPTICAL, basic_options, begin_log, kinds, log
+from experiments.report import markdown, mean_with_error, with_error, write_csv, write_text
+from experiments.tracks import part, read_track
 from facert import Settings, Take, train
 from facert.data.arrays import FloatArray, IntArray, rms
 from facert.evaluation.paired import MeanWithError, paired_ratio
@@ -44,7 +43,7 @@ class Draw:
 
     @classmethod
     def of(cls, take: Take, seed: int, everything: bool) -> Draw:
-        """By the seed; everything: what can be posed is the unlabelled part as well."""
+        """The draw of a seed; everything: what can be posed is the unlabelled part as well."""
         order = np.random.default_rng([seed, 0]).permutation(len(take))
         first = round(POSABLE * len(take))
         parts = np.split(order, np.cumsum([first, UNLABELLED, UNLABELLED, TESTED]))
@@ -53,14 +52,17 @@ class Draw:
 
 
 def at_random(take: Take, count: int, seed: int) -> IntArray:
+    """Frames chosen at random."""
     return np.random.default_rng([seed, 1]).permutation(len(take))[:count]
 
 
 def suggested(take: Take, count: int, seed: int) -> IntArray:
+    """The frames that facert suggests."""
     return suggest_frames(take, count, seed=seed).frames
 
 
 def in_two_goes(take: Take, count: int, seed: int) -> IntArray:
+    """Suggested frames, one half after the other was posed."""
     first = suggested(take, count // 2, seed)
     more = suggest_frames(take, count - len(first), have=first, seed=seed).frames
     return np.concatenate([first, more])
@@ -73,28 +75,12 @@ CHOICES: dict[str, Callable[[Take, int, int], IntArray]] = {
 }
 
 
-def part(take: Take, frames: IntArray, labels: IntArray, poses: IntArray) -> Take:
-    """Some frames of a posed take, with the poses of the labels alone, and poses without frame."""
-    assert take.params is not None
-    known = np.isin(frames, labels)[:, None]
-    return replace(
-        take,
-        time=take.time[frames],
-        source=take.source.with_matrix(take.source.matrix[frames]),
-        params=np.where(known, take.params[frames], np.nan),
-        animation=take.params[poses] if len(poses) else None,
-    )
-
-
 def error(take: Take, draw: Draw, labels: IntArray, method: str) -> float:
     """RMS over the test frames of a method that was shown the poses of these frames."""
     assert take.params is not None
     given = part(take, np.union1d(labels, draw.unlabelled), labels, draw.poses)
-    nothing = np.empty(0, dtype=np.int64)
     settings = Settings(method=method, seed=draw.seed, detect=False, smooth=False)
-    result = train(given, settings).retarget(
-        part(take, draw.test, nothing, nothing), options=AS_IT_IS
-    )
+    result = train(given, settings).retarget(part(take, draw.test), options=AS_IT_IS)
     assert result.params is not None
     return rms(result.params - take.params[draw.test])
 
@@ -110,11 +96,12 @@ class Cell:
     errors: dict[str, FloatArray]
 
     def ratio(self, choice: str) -> MeanWithError:
-        """Of the mean RMS to that of random frames."""
+        """Ratio of the mean RMS to that of random frames."""
         return paired_ratio(self.errors[choice], self.errors[RANDOM])
 
 
 def measure(track: str, target: str, everything: bool, given: argparse.Namespace) -> Iterator[Cell]:
+    """A track with every number of labels; everything: with all other posable frames."""
     take = read_track(track, target)
     unlabelled = "all" if everything else str(UNLABELLED)
     for labels in given.labels:
@@ -122,8 +109,7 @@ def measure(track: str, target: str, everything: bool, given: argparse.Namespace
         errors: dict[str, list[float]] = {choice: [] for choice in choices}
         for seed in range(given.few if everything else given.repeats):
             draw = Draw.of(take, seed, everything)
-            nothing = np.empty(0, dtype=np.int64)
-            seen = part(take, draw.posable, nothing, nothing)
+            seen = part(take, draw.posable)
             for name, choose in choices.items():
                 frames = draw.posable[choose(seen, labels, seed)]
                 errors[name].append(error(take, draw, frames, given.method))
@@ -156,30 +142,29 @@ def summary(cells: Sequence[Cell]) -> str:
 
 
 def mean_of(cells: Sequence[Cell], choice: str) -> str:
-    ratios = [cell.ratio(choice) for cell in cells]
-    if not ratios:
-        return ""
-    se = np.sqrt(np.sum([ratio.se**2 for ratio in ratios])) / len(ratios)
-    return f"{np.mean([ratio.value for ratio in ratios]):.3f} ± {se:.3f}"
+    """The mean over cells of the ratio to random frames, with its standard error."""
+    return mean_with_error([cell.ratio(choice) for cell in cells])
 
 
 def each(cells: Sequence[Cell]) -> str:
+    """Every cell, choice by choice."""
     lines = []
     for cell in cells:
         name = f"{cell.track}, {cell.target}, {cell.unlabelled} unlabelled, {cell.labels} labels"
         line = [name, str(len(cell.errors[RANDOM])), f"{cell.errors[RANDOM].mean():.4f}"]
         for choice in list(CHOICES)[1:]:
-            line += [told(cell, choice)] if choice in cell.errors else [""]
+            shown = choice in cell.errors
+            line += [_rms_and_ratio(cell, choice)] if shown else [""]
         lines.append(line)
     return markdown(["cell", "draws", *CHOICES], lines)
 
 
-def told(cell: Cell, choice: str) -> str:
-    ratio = cell.ratio(choice)
-    return f"{cell.errors[choice].mean():.4f} ({ratio.value:.3f} ± {ratio.se:.3f})"
+def _rms_and_ratio(cell: Cell, choice: str) -> str:
+    return f"{cell.errors[choice].mean():.4f} ({with_error(cell.ratio(choice))})"
 
 
 def records(cells: Sequence[Cell]) -> list[dict[str, object]]:
+    """A line of the CSV file for each cell and choice."""
     return [
         {
             "track": cell.track,
@@ -204,7 +189,7 @@ def write(cells: Sequence[Cell], given: argparse.Namespace) -> None:
         "# Suggested frames against random ones",
         f"RMS of `{given.method}` divided by that with as many random frames, mean over tracks and"
         " targets, with its standard error. Written by `python -m experiments.suggestion`, which"
-        " tells how frames are drawn.",
+        " describes how frames are drawn.",
         summary(cells),
         "## Cell by cell",
         "RMS, and in brackets its ratio to that with random frames.",
@@ -215,15 +200,10 @@ def write(cells: Sequence[Cell], given: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--tracks", nargs="+", choices=TARGETS, default=list(TARGETS))
+    parser = basic_options(__doc__, repeats=20)
     parser.add_argument("--labels", nargs="+", type=int, default=[10, 20, 40])
     parser.add_argument("--method", default="auto")
-    parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--few", type=int, default=5, help="draws with all frames (%(default)s)")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder (%(default)s)")
     given = parser.parse_args()
     begin_log()
     cells: list[Cell] = []

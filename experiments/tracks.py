@@ -19,6 +19,38 @@ def read_track(name: str, target: str) -> Take:
     return read_take(DATA / "tracks" / f"{name}.npz", target=target)
 
 
+def middle(frames: int, most: int) -> slice:
+    """The middle of a track, at most so many frames of it."""
+    start = max(0, (frames - most) // 2)
+    return slice(start, start + most)
+
+
+def part(
+    take: Take, frames: IntArray, labels: IntArray | None = None, poses: IntArray | None = None
+) -> Take:
+    """Some frames of a posed take.
+
+    Parameters
+    ----------
+    take : Take
+        With a pose in every frame.
+    frames : array of int
+    labels : array of int, optional
+        Frames of the take whose poses are kept.
+    poses : array of int, optional
+        Frames whose poses serve as animation.
+    """
+    assert take.params is not None
+    labelled = None if labels is None else np.isin(frames, labels)[:, None]
+    return replace(
+        take,
+        time=take.time[frames],
+        source=take.source.with_matrix(take.source.matrix[frames]),
+        params=None if labelled is None else np.where(labelled, take.params[frames], np.nan),
+        animation=None if poses is None else take.params[poses],
+    )
+
+
 def draw(take: Take, labels: int, unlabelled: int, seed: int) -> tuple[Take, IntArray]:
     """A take with so many posed frames, and the frames to test on.
 

@@ -3,9 +3,9 @@
     python -m experiments.uncertainty [--frames 1500]
 
 Part of the face, then another, is hidden for a while, as `experiments.cleaning` hides regions. From
-labels in the same take all its other frames are retargeted as facert does by default. *Told* is the
-root mean square of the standard deviations, *error* that of the errors; *within* is the share of
-errors that are less than two standard deviations, 95 % of a normal distribution.
+labels in the same take all its other frames are retargeted as facert does by default. *Predicted*
+is the root mean square of the standard deviations, *error* that of the errors; *within* is the
+share of errors that are less than two standard deviations, 95 % of a normal distribution.
 
 Writes `experiments/results/uncertainty.md`.
 """
@@ -28,14 +28,14 @@ from facert.data.arrays import FloatArray, rms
 
 NOISES = (0.0, 0.05)
 SHARE = 0.2  # of the markers, on average, that are hidden
-HEADER = ("what", "track", "noise", "error", "told", "told / error", "within")
+HEADER = ("what", "track", "noise", "error", "predicted", "predicted / error", "within")
 
 
 def shown(what: str, cell: Cell, error: FloatArray, std: FloatArray) -> tuple[str, ...]:
     """A row of the table."""
-    off, told = rms(error), rms(std)
+    off, predicted = rms(error), rms(std)
     within = float(np.mean(np.abs(error) < 2.0 * std))
-    numbers = (f"{off:.4f}", f"{told:.4f}", f"{told / off:.2f}", f"{within:.0%}")
+    numbers = (f"{off:.4f}", f"{predicted:.4f}", f"{predicted / off:.2f}", f"{within:.0%}")
     return (what, f"{cell.track}, {cell.target}", f"{cell.noise:g}", *numbers)
 
 

@@ -4,7 +4,7 @@
 
 Labels and test frames are drawn at random; unlabelled frames come from the front of what is left,
 unlabelled poses from its back. Where the take is too short for both, some frames serve as either,
-without being told which belong together. Three learn from them: the shared model as it is by
+without the pairs of them that belong together. Three learn from them: the shared model as it is by
 default, whose unlabelled rows weigh no more than 100; the same with the exact likelihood, in which
 every row counts alike (up to 300: its time grows with the cube); and `auto`. Finished cells are
 kept in build/cells: the same command continues an interrupted run.
@@ -30,9 +30,9 @@ from matplotlib.figure import Figure
 
 import facert
 from experiments.drawing import save
-from experiments.grid import KEPT, RESULTS, code_of
+from experiments.grid import KEPT, RESULTS, begin_log, code_of
 from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import read_track
+from experiments.tracks import part, read_track
 from facert import Settings, Take
 from facert.data.arrays import IntArray, rms
 from facert.io.journal import Journal
@@ -80,19 +80,10 @@ class Cell:
 
 def drawn(truth: Take, labels: int, unlabelled: int, seed: int) -> tuple[Take, IntArray]:
     """A take to learn from, and the frames to test on."""
-    assert truth.params is not None
     order = np.random.default_rng(seed).permutation(len(truth))
     test, labelled, rest = np.split(order, [TESTED, TESTED + labels])
     rows = np.sort(np.concatenate([labelled, rest[:unlabelled]]))
-    posed = np.isin(rows, labelled)[:, None]
-    take = replace(
-        truth,
-        time=truth.time[rows],
-        source=truth.source.with_matrix(truth.source.matrix[rows]),
-        params=np.where(posed, truth.params[rows], np.nan),
-        animation=truth.params[np.sort(rest[::-1][:unlabelled])],
-    )
-    return take, np.sort(test)
+    return part(truth, rows, labelled, np.sort(rest[::-1][:unlabelled])), np.sort(test)
 
 
 Task = tuple[tuple[str, str, int], int, str, int]  # problem, draw, learner, unlabelled
@@ -113,18 +104,13 @@ def evaluated(task: Task) -> Cell:
     truth = read_track(track, target)
     assert truth.params is not None
     take, test = drawn(truth, labels, count, draw)
-    asked = replace(
-        truth,
-        time=truth.time[test],
-        source=truth.source.with_matrix(truth.source.matrix[test]),
-        params=None,
-    )
     began = time.process_time()
     retargeter = facert.train(take, replace(LEARNERS[name], unlabelled=count, seed=draw))
     spent = time.process_time() - began
-    said = retargeter.retarget(asked).params
-    assert said is not None
-    return Cell(track, target, labels, draw, name, count, rms(said - truth.params[test]), spent)
+    predicted = retargeter.retarget(part(truth, test)).params
+    assert predicted is not None
+    error = rms(predicted - truth.params[test])
+    return Cell(track, target, labels, draw, name, count, error, spent)
 
 
 def measured(waiting: Sequence[Task], jobs: int) -> list[Cell]:
@@ -212,8 +198,7 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=COUNTS[-1], help="unlabelled (%(default)s)")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder (%(default)s)")
     given = parser.parse_args()
-    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    log.setLevel(logging.INFO)
+    begin_log(log)
     cells = measured(tasks(given.repeats, given.most), given.jobs)
     report(cells, given.repeats, given.results)
     print((given.results / "unlabelled.md").read_text(encoding="utf-8"))

@@ -31,7 +31,7 @@ class Figure:
         In the unit.
     unit : str
     reference : str
-        What else was measured in the same run, or what the paper says.
+        What else was measured in the same run, or the paper's figure.
     ratio : float
         Ours by the reference's, medians: below 1 is less.
     """

@@ -2,7 +2,7 @@
 
 python -m experiments.bench.live [--seconds 600] [--rate 120 60] [--record]
 
-Latency *inside* is what `facert live` says of itself: from a packet's arrival in the process until
+Latency *inside* is what `facert live` itself reports: from a packet's arrival in the process until
 its pose is sent. *End to end* is from the sender's call until the receiver has read the last packet
 of the pose, and holds the waiting of all three processes for a core.
 """
@@ -173,19 +173,19 @@ def measure(model: Path, take: Take, rate: float, seconds: float, options: list[
             phone.join()
             held = np.array(memory.found)  # before files are written
             running.process.send_signal(signal.SIGINT)
-            told = json.loads(running.process.communicate()[0])
-    tell(rate, told, 1e3 * (arrived - np.array(sent)), held)
+            summary = json.loads(running.process.communicate()[0])
+    report(rate, summary, 1e3 * (arrived - np.array(sent)), held)
 
 
-def tell(rate: float, told: dict[str, Any], delays: FloatArray, memory: FloatArray) -> None:
+def report(rate: float, summary: dict[str, Any], delays: FloatArray, memory: FloatArray) -> None:
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     print(f"{len(delays)} frames at {rate:g}/s, {load}")
     counted = ", ".join(
-        f"{name} {told[name]}"
+        f"{name} {summary[name]}"
         for name in ("received", "mapped", "dropped", "late", "bad", "failed")
     )
     print(f"lost: {np.isnan(delays).sum()} ({counted})")
-    inside = ", ".join(f"{name} {value:.3f}" for name, value in told["latency_ms"].items())
+    inside = ", ".join(f"{name} {value:.3f}" for name, value in summary["latency_ms"].items())
     print(f"latency inside, ms: {inside}")
     median, p99, worst = np.nanpercentile(delays, [50, 99, 100])
     print(f"latency end to end, ms: median {median:.3f}, p99 {p99:.3f}, worst {worst:.3f}")

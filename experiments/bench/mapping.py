@@ -19,7 +19,7 @@ from facert.methods.registry import make_method
 from facert.models.threads import threads_for
 
 METHODS = ("auto", "ssgplvm", "ssgpr", "gpr", "svr")
-PAPER = 30.0  # ms, the least that it says
+PAPER = 30.0  # ms, the least that it reports
 FRAMES, WARM = 1000, 10
 NOISE = 0.1  # normalised units
 

@@ -38,7 +38,7 @@ class Demand:
     method, other : str
         `other` may be ``best``: whichever of all baselines has the least mean error.
     most : float, optional
-        None: told for comparison.
+        None: given for comparison.
     """
 
     method: str
