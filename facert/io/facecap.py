@@ -15,7 +15,7 @@ from facert.data.names import canonical
 from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError, reading
-from facert.io.cells import Line, check_width, read_lines, to_numbers
+from facert.io.lines import Line, check_width, read_lines, to_numbers
 
 log = logging.getLogger("facert")
 

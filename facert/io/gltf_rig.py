@@ -38,7 +38,7 @@ class _Primitive:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _PlacedMesh:
     """Vertices and how morph targets move them, in the space of the scene."""
 
     vertices: FloatArray  # (V, 3)
@@ -93,7 +93,7 @@ def _primitives(document: Document) -> Iterator[_Primitive]:
                 yield _Primitive(mesh, one, one.get("targets", []), placed)
 
 
-def _part(document: Document, one: _Primitive) -> _Part:
+def _part(document: Document, one: _Primitive) -> _PlacedMesh:
     attributes = one.entry["attributes"]
     vertices = _vectors(document, attributes["POSITION"])
     _require_moderate(len(one.targets), len(vertices))
@@ -106,7 +106,7 @@ def _part(document: Document, one: _Primitive) -> _Part:
         indices = document.integers(one.entry["indices"])
     colours = document.numbers(attributes["COLOR_0"])[:, :3] if "COLOR_0" in attributes else None
     turn, place = one.world[:3, :3], one.world[:3, 3]
-    return _Part(
+    return _PlacedMesh(
         vertices=vertices @ turn.T + place,
         targets=moved @ turn.T,
         names=target_names(one.mesh, len(one.targets)) if one.targets else (),
@@ -115,7 +115,7 @@ def _part(document: Document, one: _Primitive) -> _Part:
     )
 
 
-def _united(parts: Sequence[_Part]) -> _Part:
+def _united(parts: Sequence[_PlacedMesh]) -> _PlacedMesh:
     """All parts as one; a target that a part does not have leaves it at rest."""
     names = tuple(dict.fromkeys(name for part in parts for name in part.names))
     sizes = [len(part.vertices) for part in parts]
@@ -125,7 +125,7 @@ def _united(parts: Sequence[_Part]) -> _Part:
     for part, start in zip(parts, starts, strict=True):
         rows = [names.index(name) for name in part.names]
         targets[rows, start : start + len(part.vertices)] = part.targets
-    return _Part(
+    return _PlacedMesh(
         vertices=np.concatenate([part.vertices for part in parts]),
         targets=targets,
         names=names,
@@ -134,7 +134,7 @@ def _united(parts: Sequence[_Part]) -> _Part:
     )
 
 
-def _welded(part: _Part) -> _Part:
+def _welded(part: _PlacedMesh) -> _PlacedMesh:
     """The part with vertices of equal place and motion made one, in the order of the first ones."""
     motion = part.targets.transpose(1, 0, 2).reshape(len(part.vertices), -1)
     rows = np.concatenate([part.vertices, motion], axis=1)
@@ -176,7 +176,7 @@ def target_names(mesh: dict[str, Any], count: int) -> tuple[str, ...]:
     return tuple(str(name) for name in names)
 
 
-def _colours(parts: Sequence[_Part]) -> FloatArray | None:
+def _colours(parts: Sequence[_PlacedMesh]) -> FloatArray | None:
     """Colours (V, 3) as a screen shows them, if all parts have some; glTF's are linear light."""
     colours = [part.colours for part in parts if part.colours is not None]
     if len(colours) < len(parts):

@@ -52,7 +52,7 @@ class GuardedFile:
         self._file = file
 
     def __contains__(self, path: str) -> bool:
-        """Tell whether there is something at `path`, without following a link to elsewhere."""
+        """Whether there is something at `path`, without following a link to elsewhere."""
         return self._find(path) is not None
 
     def numbers(self, path: str) -> FloatArray:
@@ -67,14 +67,14 @@ class GuardedFile:
         """Read a dataset of booleans, or of integers that stand for them."""
         return self._read(path, "biu", "booleans").astype(np.bool_)
 
-    def rows(self, path: str) -> Rows:
+    def rows(self, path: str) -> StoredRows:
         """A dataset of integers or floats that is read a few rows at a time; it may be large."""
         dataset = self._dataset(path)
         _check_layout(dataset, path)
         if _dtype(dataset, path).kind not in "iuf" or not dataset.ndim:
             raise _unexpected(path, "rows of numbers", _describe(dataset))
         _check_size(dataset, path, dataset.shape[1:])
-        return Rows(dataset, path)
+        return StoredRows(dataset, path)
 
     def names(self, path: str) -> tuple[str, ...]:
         """Read a list of names: UTF-8 strings of fixed or variable length."""
@@ -185,7 +185,7 @@ class GuardedFile:
         return value.item() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-class Rows:
+class StoredRows:
     """A dataset in an open file, read a few rows at a time."""
 
     def __init__(self, dataset: h5py.Dataset, path: str) -> None:

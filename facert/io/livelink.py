@@ -33,7 +33,7 @@ from facert.data.timecode import (
 )
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.cells import Line, check_width, read_csv, to_numbers
+from facert.io.lines import Line, check_width, read_csv, to_numbers
 
 log = logging.getLogger("facert")
 
@@ -44,7 +44,7 @@ _ENOUGH_STEPS, _ENOUGH_SECONDS = 10, 2
 
 
 def is_livelink(header: Sequence[str]) -> bool:
-    """Tell by its header whether a CSV file is one of Live Link Face."""
+    """Whether a CSV file with this header is one of Live Link Face."""
     return tuple(cell.lower() for cell in header[:2]) == tuple(name.lower() for name in _LEADING)
 
 

@@ -54,7 +54,7 @@ class Archive:
         )
 
     def __contains__(self, key: str) -> bool:
-        """Tell whether there is an array of that name."""
+        """Whether there is an array of that name."""
         return key in self.keys
 
     def numbers(self, key: str) -> FloatArray:

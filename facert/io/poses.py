@@ -12,8 +12,8 @@ from facert.data.labelling import Poses, poses_of, predicted_poses
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.cells import check_width, read_csv, read_header, to_numbers
 from facert.io.formats import read_take_file
+from facert.io.lines import check_width, read_csv, read_header, to_numbers
 
 log = logging.getLogger("facert")
 

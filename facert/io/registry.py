@@ -68,8 +68,8 @@ FORMATS = (
     ),
     Format(
         (".csv",),
-        read={"take": "table.read_csv_take"},
-        write={"take": "table.write_table"},
+        read={"take": "csv_table.read_csv_take"},
+        write={"take": "csv_table.write_table"},
         about=" of Live Link Face or plain",
         reads="Live Link Face, or a table with a header: `time` or `frame`, `NAME.x NAME.y NAME.z` "
         "or weights; separated by commas, or by semicolons or tabs with decimal commas as well",

@@ -21,7 +21,7 @@ from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.cells import Line, read_lines, to_numbers
+from facert.io.lines import Line, read_lines, to_numbers
 
 log = logging.getLogger("facert")
 

@@ -66,7 +66,7 @@ def test_names_are_matched_whatever_their_order(names):
     assert [names[index] for index in match(upper, names, "names")] == list(ARKIT_NAMES)
 
 
-def test_a_name_without_a_match_is_told_with_the_nearest():
+def test_a_name_without_a_match_is_named_with_the_nearest():
     with pytest.raises(InputError, match=r"'jawOpn' \(and 1 more\), found nearest: 'JawOpen'"):
         match(["jawLeft", "jawOpn", "nose"], ["JawOpen", "JawLeft"], "/source/names")
 

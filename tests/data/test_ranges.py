@@ -11,7 +11,7 @@ def test_a_range_of_frames_is_all_of_them():
 
 
 @pytest.mark.parametrize("text", ["a..b", "5..1", "", "1..3:0", "1..2..3"])
-def test_what_was_typed_is_told_with_an_example_that_fits(text):
+def test_the_message_quotes_what_was_typed_with_an_example_that_fits(text):
     with pytest.raises(InputError) as caught:
         parse_frames(text, "--neutral")
     assert caught.value.found == repr(text)

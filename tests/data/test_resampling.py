@@ -99,7 +99,7 @@ def test_no_label_is_lost_between_frames(caplog: pytest.LogCaptureFixture) -> No
     assert "1 pose moved by up to 17 ms" in caplog.text
 
 
-def test_two_labels_for_one_frame_are_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_two_labels_for_one_frame_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, "facert")
     found = resampled(posed([7, 13, 40]), 5.0)
     assert found.params[found.labels, 0].tolist() == [13, 40]

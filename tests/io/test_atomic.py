@@ -17,7 +17,7 @@ def test_the_file_appears_under_its_name_and_nothing_else_stays(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_an_existing_file_is_kept_unless_told_otherwise(tmp_path):
+def test_an_existing_file_is_kept_unless_overwriting_is_asked_for(tmp_path):
     path = tmp_path / "take.h5"
     path.write_text("old")
     with pytest.raises(OutputExistsError, match="--overwrite"), replacing(path) as temporary:

@@ -86,7 +86,7 @@ def test_points_that_were_not_identified_are_left_out(tmp_path: Path) -> None:
     np.testing.assert_array_equal(take.source.values, POSITIONS[:, [0, 2]])
 
 
-def test_a_file_that_is_cut_short_says_so(path: Path) -> None:
+def test_a_file_that_is_cut_short_is_refused(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-512])
     with pytest.raises(InputError, match="frames: expected 6 as declared"):
         read_c3d(path)

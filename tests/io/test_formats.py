@@ -25,7 +25,7 @@ RIG = Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))
 @pytest.mark.parametrize(
     "name", ["take.h5", "take.HDF5", "take.csv", "take.livelink.csv", "a.json"]
 )
-def test_the_ending_tells_the_format_of_a_take(tmp_path, name):
+def test_the_ending_decides_the_format_of_a_take(tmp_path, name):
     path = tmp_path / name
     formats.write_take_file(TAKE, path)
     read = formats.read_take_file(path)
@@ -35,7 +35,7 @@ def test_the_ending_tells_the_format_of_a_take(tmp_path, name):
     assert path.read_bytes().startswith(b"Timecode") == name.endswith(".livelink.csv")
 
 
-def test_hdf5_and_npz_files_tell_takes_from_rigs(tmp_path):
+def test_hdf5_and_npz_files_hold_takes_or_rigs(tmp_path):
     formats.write_rig_file(RIG, tmp_path / "rig.h5")
     formats.write_take_file(TAKE, tmp_path / "take.h5")
     np.savez(tmp_path / "rig.npz", neutral=RIG.neutral, faces=RIG.faces, deltas=RIG.shapes,
@@ -132,19 +132,19 @@ def test_of_a_glb_with_both_each_reader_gets_its_own(tmp_path, caplog):
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.json"])
-def test_a_few_poses_without_their_recording_are_told_how_to_come_back(
+def test_a_few_poses_without_their_recording_come_with_a_way_back(
     make_take, tmp_path, name, caplog
 ):
     take = make_take(frames=30, posed=4)
     formats.write_take_file(take, tmp_path / name)
     assert f"{name} holds 4 poses and not what was recorded" in caplog.text
-    # As the warning says, the two together are what was there before.
+    # As in the warning, the two together are what was there before.
     back = labelled(replace(take, params=None, animation=None), read_poses(tmp_path / name))
     np.testing.assert_array_equal(back.labels, take.labels)
     np.testing.assert_allclose(back.params, take.params, atol=1e-9)
 
 
-def test_a_few_poses_for_live_link_are_told_to_lose_their_frames(make_take, tmp_path, caplog):
+def test_a_few_poses_for_live_link_lose_their_frames_with_a_warning(make_take, tmp_path, caplog):
     take = replace(make_take(frames=30, posed=4), controls=Controls(ARKIT_SHAPES[:4]))
     formats.write_take_file(take, tmp_path / "a.livelink.csv")
     assert "only a .csv, .json or .h5 keeps which frames they belong to" in caplog.text

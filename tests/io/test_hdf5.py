@@ -196,7 +196,7 @@ def test_attributes_are_one_number_or_text(path):
                 read(name)
 
 
-def test_a_file_that_is_missing_cut_short_or_something_else_is_told_apart(tmp_path):
+def test_a_file_that_is_missing_cut_short_or_something_else_is_named_as_such(tmp_path):
     with pytest.raises(InputError, match="found nothing"), open_guarded(tmp_path / "no.h5"):
         pass
     with pytest.raises(InputError, match="a folder"), open_guarded(tmp_path):

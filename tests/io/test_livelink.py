@@ -58,14 +58,14 @@ def counting(count, rate, seconds=3.0):
 @pytest.mark.parametrize(
     ("count", "rate"), [(60, 30), (60, 60), (30, 30), (24, 24), (25, 25), (50, 50), (60, 15)]
 )
-def test_what_a_second_counts_is_told_from_where_seconds_change(path, count, rate):
+def test_what_a_second_counts_shows_where_seconds_change(path, count, rate):
     codes = counting(count, rate)
     del codes[7:9], codes[rate + 2]
     write(path, ["jawOpen"], codes, [["1", 0.0]] * len(codes))
     take = read_livelink(path)
     assert take.fps == rate
     assert take.time[-1] == pytest.approx(3 - 4 / rate)
-    # Read alone, by the take's rate, the start says the same moment.
+    # Read alone, by the take's rate, the start is the same moment.
     assert timecode(take.start_timecode, 1 - 3 / rate, take.fps).startswith("01:00:01:00")
 
 
@@ -89,7 +89,7 @@ def test_all_usual_numbers_of_columns_are_read(path, count):
     assert read_livelink(path).source.names == ARKIT_NAMES[:count]
 
 
-def test_an_unknown_column_stays_and_is_told_about(path, caplog):
+def test_an_unknown_column_stays_with_a_warning(path, caplog):
     write(path, names=[*ARKIT_SHAPES[:51], "tongeOut"])
     assert read_livelink(path).source.names[-1] == "tongeOut"
     assert "did you mean tongueOut" in caplog.text

@@ -149,7 +149,7 @@ def test_a_pickle_is_never_opened(tmp_path, path):
     assert not (tmp_path / "sprung").exists()
 
 
-def test_damaged_and_missing_files_are_told_apart(path):
+def test_damaged_and_missing_files_are_distinguished(path):
     with pytest.raises(InputError, match="found nothing"):
         read_npz_take(path)
     path.write_text("no archive")

@@ -56,7 +56,7 @@ def test_shapes_of_another_mesh_are_refused(tmp_path):
         read_obj_folder(tmp_path)
 
 
-def test_shapes_with_other_faces_are_told_about(tmp_path, caplog):
+def test_shapes_with_other_faces_are_logged(tmp_path, caplog):
     (tmp_path / "neutral.obj").write_text(f"{SQUARE}f 1 2 3 4\n")
     (tmp_path / "smile.obj").write_text(f"{SQUARE}f 2 3 4 1\n")
     read_obj_folder(tmp_path)

@@ -137,5 +137,5 @@ def test_a_file_of_another_kind_or_a_newer_version_is_refused(path):
     refused(path, "format_version: expected 1, found 2. Update facert")
 
 
-def test_a_file_that_is_not_there_is_told(path):
+def test_a_file_that_is_not_there_is_named(path):
     refused(path, "expected")

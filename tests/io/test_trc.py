@@ -47,7 +47,7 @@ def test_the_column_time_counts_where_the_header_states_another_rate(path: Path,
 
 
 @pytest.mark.parametrize("stated", ["120", "119.88", "", "?"])
-def test_a_rate_that_agrees_or_says_nothing_needs_no_word(path: Path, stated: str, caplog) -> None:
+def test_a_rate_that_agrees_or_is_absent_needs_no_word(path: Path, stated: str, caplog) -> None:
     path.write_text((HEADER + ROWS).replace("120\t120\t3", f"{stated}\t120\t3"))
     assert read_trc(path).fps == pytest.approx(120, rel=0.01)
     assert not caplog.records

@@ -123,7 +123,7 @@ def test_an_existing_file_is_kept_and_a_mesh_needs_triangles(tmp_path: Path) -> 
     assert [path.name for path in tmp_path.iterdir()] == ["a.usda"]
 
 
-def test_without_usd_core_the_error_says_what_to_install(tmp_path, monkeypatch) -> None:
+def test_without_usd_core_the_error_names_what_to_install(tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pxr", None)
     with pytest.raises(FacertError, match=r"pip install 'facert\[usd\]'"):
         write_usd(MORPHS, tmp_path / "a.usda")

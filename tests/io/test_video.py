@@ -35,8 +35,8 @@ def test_an_mp4_has_every_picture_at_its_rate(tmp_path: Path) -> None:
     decoded = subprocess.run(raw, capture_output=True, check=True)
     shades = np.frombuffer(decoded.stdout, np.uint8).reshape(PICTURES.shape).mean(axis=(1, 2, 3))
     np.testing.assert_allclose(shades, SHADES, atol=6)
-    for said in (b"h264", b"yuv420p", b"64x32", b"25 fps"):
-        assert said in decoded.stderr
+    for fact in (b"h264", b"yuv420p", b"64x32", b"25 fps"):
+        assert fact in decoded.stderr
 
 
 @pytest.mark.parametrize("ending", [".gif", ".mp4"])

@@ -49,7 +49,7 @@ def test_the_target_is_the_weights_that_drive_the_rig():
     assert len(take.labels) == len(take)
 
 
-def test_names_without_a_match_are_told(caplog):
+def test_names_without_a_match_are_logged(caplog):
     caplog.set_level(logging.INFO)
     simulate_capture(make_rig(), make_performance())
     assert "1 shape of the rig without a weight: extra" in caplog.text

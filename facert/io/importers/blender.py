@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from facert.io.importers.curves import find, keys, read_curves
+from facert.io.importers.shared import find, keys, read_curves
 
 CURVES = ""  # e.g. "/shots/010/curves.json"
 OBJECT = ""  # the object with the shape keys; empty: the active one

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import maya.cmds as cmds
 
-from facert.io.importers.curves import find, keys, read_curves
+from facert.io.importers.shared import find, keys, read_curves
 
 START = 0.0  # seconds of the first key
 

@@ -16,7 +16,7 @@ from facert.data.take import Source, Take
 from facert.io.curves import write_curves
 from facert.io.formats import write_take_file
 from facert.io.importers import PROGRAMS, script
-from facert.io.importers.curves import find, keys, read_curves, spelling
+from facert.io.importers.shared import find, keys, read_curves, spelling
 
 VALUES = np.array([[0.1, 0.5], [np.nan, 0.5], [0.3, 0.5]])
 TAKE = Take([0.5, 0.54, 0.58], Source(VALUES, ("jawOpen", "eyeBlink_L")), fps=25.0)
@@ -123,21 +123,21 @@ def without_future(program: str) -> str:
 
 def test_maya_keys_attributes_by_time(folder: Path) -> None:
     call = 'key_attributes("curves.json", "face"); print(cmds.keyed)'
-    said = run(folder, "from __future__ import annotations", MAYA, without_future("maya"), call)
-    keyed: list[Any] = eval(said.splitlines()[-1])
+    printed = run(folder, "from __future__ import annotations", MAYA, without_future("maya"), call)
+    keyed: list[Any] = eval(printed.splitlines()[-1])
     assert keyed == [
         ("face", "JawOpen", "0.000000sec", 0.1),
         ("face", "JawOpen", "0.080000sec", 0.3),
         ("face", "eyeBlinkLeft", "0.000000sec", 0.5),
     ]
-    assert "no attribute for 'other.smile'" in said
+    assert "no attribute for 'other.smile'" in printed
 
 
 @pytest.mark.parametrize("modern", [True, False])
 def test_blender_keys_shapes_by_time_at_the_rate_of_its_scene(folder: Path, modern: bool) -> None:
     call = """key_shapes("curves.json", "Face")
 print({path: [point.co for point in one.keyframe_points] for path, one in curves.items()})"""
-    said = run(
+    printed = run(
         folder,
         "from __future__ import annotations",
         f"MODERN = {modern}",
@@ -145,10 +145,10 @@ print({path: [point.co for point in one.keyframe_points] for path, one in curves
         without_future("blender"),
         call,
     )
-    keyed: dict[str, list[Any]] = eval(said.splitlines()[-1])
+    keyed: dict[str, list[Any]] = eval(printed.splitlines()[-1])
     assert list(keyed) == ['key_blocks["jawopen"].value', 'key_blocks["eyeBlink.L"].value']
     (first, last), (constant,) = keyed.values()
     np.testing.assert_allclose(first, (1, 0.1))
     np.testing.assert_allclose(last, (5, 0.3))
     np.testing.assert_allclose(constant, (1, 0.5))
-    assert "no shape key for 'other.smile'" in said
+    assert "no shape key for 'other.smile'" in printed

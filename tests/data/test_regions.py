@@ -35,7 +35,7 @@ def test_names_are_spelled_as_in_the_take():
         (MARKERS, [*CONTROLS, "blink", "wink"], "every control.*'blink' and 1 more in none"),
     ],
 )
-def test_what_does_not_fit_the_take_is_told(markers, controls, message):
+def test_what_does_not_fit_the_take_is_named(markers, controls, message):
     with pytest.raises(InputError, match=message):
         Regions.of(TABLES).matched(markers, controls)
 

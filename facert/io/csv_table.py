@@ -20,7 +20,7 @@ from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take, named_columns
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.cells import check_width, read_csv, read_header, to_numbers
+from facert.io.lines import check_width, read_csv, read_header, to_numbers
 from facert.io.livelink import is_livelink, read_livelink
 
 _COORDINATE = re.compile(r"(.+)[._]([xyz])", re.IGNORECASE)

@@ -46,6 +46,6 @@ def test_a_file_of_something_else_is_refused_by_name(tmp_path, text, message):
         read_regions(path)
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.toml: file: expected an existing file"):
         read_regions(tmp_path / "none.toml")
