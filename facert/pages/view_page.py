@@ -81,14 +81,10 @@ class ViewPage(PlayedPage):
             ("Largest errors", performance.errors, "off by", units),
         )
         for title, values, word, unit in lists:
-            frames = [] if values is None else highest(values, performance.take.time, LISTED)
-            ButtonList(self._server, title, self.seek).show(
-                {
-                    f: f"frame {f}   {word} {values[f]:.2g} {unit}"
-                    for f in frames
-                    if values is not None
-                }
-            )
+            if values is not None:
+                frames = highest(values, performance.take.time, LISTED)
+                labels = {f: f"frame {f}   {word} {values[f]:.2g} {unit}" for f in frames}
+                ButtonList(self._server, title, self.seek).show(labels)
 
     def _add_curves(self) -> None:
         take = self.performance.take
