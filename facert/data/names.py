@@ -109,6 +109,14 @@ class NameIndex:
         """The position of `name`, or None."""
         return self._exact.get(name, self._folded.get(folded(name)))
 
+    def find_halves(self, name: str) -> list[int]:
+        """The position of `name`, or else those of its left and right half; empty without both."""
+        whole = self.find(name)
+        if whole is not None:
+            return [whole]
+        halves = [self.find(f"{name}_{side}") for side in "LR"]
+        return [half for half in halves if half is not None] if None not in halves else []
+
 
 def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
     """Where each wanted name stands among others, in any spelling: indices into `among`, (P,).
@@ -187,7 +195,7 @@ def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
     Raises `InputError` when the rig has no shape for a control, or one shape for two of them.
     """
     index = NameIndex(shapes)
-    driven = [_driven(control, index) for control in controls]
+    driven = [index.find_halves(control) for control in controls]
     unknown = [name for name, found in zip(controls, driven, strict=True) if not found]
     if unknown:
         near = nearest(unknown[0], shapes)
@@ -200,15 +208,6 @@ def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
         drivers[control, found] = 1.0
     _require_one_driver(drivers, controls, shapes)
     return drivers
-
-
-def _driven(control: str, index: NameIndex) -> list[int]:
-    """The shape of a control, or its left and right halves."""
-    whole = index.find(control)
-    if whole is not None:
-        return [whole]
-    halves = [index.find(f"{control}_{side}") for side in "LR"]
-    return [half for half in halves if half is not None] if None not in halves else []
 
 
 def _require_one_driver(

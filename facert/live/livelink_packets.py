@@ -25,14 +25,13 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import ARKIT_NAMES, NameIndex, nearest
+from facert.data.timecode import LIVE_LINK_RATE
 from facert.errors import InputError
 from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
 
 log = logging.getLogger("facert")
 
 VERSION = 6
-RATE = 60
-"""Frame numbers a second in what is sent, as the app counts them."""
 ABSURD = 100.0
 """No weight and no angle comes near it."""
 
@@ -100,8 +99,8 @@ class LiveLinkEncoder:
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
         """One packet; shapes that the character has no control for are 0."""
         self._values[self._places] = 0.5 * (params[self._left] + params[self._right])
-        frame, fraction = divmod((self._midnight + time) * RATE, 1.0)
-        clock = _TIME.pack(int(frame), fraction, RATE, 1)
+        frame, fraction = divmod((self._midnight + time) * LIVE_LINK_RATE, 1.0)
+        clock = _TIME.pack(int(frame), fraction, LIVE_LINK_RATE, 1)
         return [self._head + clock + bytes([_COUNT]) + self._values.tobytes()]
 
 
@@ -137,11 +136,10 @@ def _halves(controls: Sequence[str]) -> IntArray:
     """
     index, found, halved = NameIndex(controls), [], []
     for place, name in enumerate(PACKET_NAMES):
-        whole, left, right = (index.find(name + side) for side in ("", "_L", "_R"))
-        if whole is not None:
-            found.append((place, whole, whole))
-        elif left is not None and right is not None:
-            found.append((place, left, right))
+        columns = index.find_halves(name)
+        if columns:
+            found.append((place, columns[0], columns[-1]))
+        if len(columns) > 1:
             halved.append(name)
     used = {column for _, *columns in found for column in columns}
     _report_foreign([name for column, name in enumerate(controls) if column not in used], controls)
