@@ -127,7 +127,10 @@ class FaceDriver:
         method: str = DEFAULT,
         loose: LooseParts = "refuse",
     ) -> None:
-        self.neutral = _checked_neutral(neutral)
+        if neutral.ndim != 2 or neutral.shape[1] != 3 or not np.isfinite(neutral).all():
+            found = f"{neutral.shape}, or NaN"
+            raise InputError("/neutral", "finite positions (V, 3)", found, "Check the export.")
+        self.neutral = neutral
         self.labelled = checked_labels(labelled, len(neutral))
         if method not in METHODS:
             known = ", ".join(METHODS)
@@ -201,27 +204,10 @@ class FaceDriver:
         return deformed
 
 
-def _checked_neutral(neutral: FloatArray) -> FloatArray:
-    if neutral.ndim != 2 or neutral.shape[1] != 3 or not np.isfinite(neutral).all():
-        raise InputError(
-            "/neutral", "finite positions (V, 3)", f"{neutral.shape}, or NaN", "Check the export."
-        )
-    return neutral
-
-
 def _parts_with_anchors(
     vertices: FloatArray, components: IntArray, held: BoolArray
 ) -> list[tuple[IntArray, IntArray]]:
-    """The connected components that are not held by labels, each with its anchors.
-
-    Parameters
-    ----------
-    vertices : array, shape (V, 3)
-    components : array of int, shape (V,)
-        The number of the component of each vertex.
-    held : array of bool, shape (V,)
-        Which vertices belong to a component with labels.
-    """
+    """The connected components that are not held by labels (V,), each with its anchors."""
     candidates = np.flatnonzero(held)
     tree = cKDTree(vertices[candidates])
     found = []

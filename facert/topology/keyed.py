@@ -39,8 +39,8 @@ class KeyedPerformance:
     labels: FloatArray
 
     def __post_init__(self) -> None:
-        _require_finite(self.source, 3, "source")
-        _require_finite(self.labels, 3, "key poses")
+        _require_finite(self.source, "source")
+        _require_finite(self.labels, "key poses")
         object.__setattr__(self, "keys", checked_labels(self.keys, len(self.source)))
         if len(self.keys) < LEAST:
             raise InputError(
@@ -92,7 +92,7 @@ def even_keys(frames: int, every: int) -> IntArray:
     return np.unique(np.append(np.arange(0, frames, every), frames - 1))
 
 
-def _require_finite(values: FloatArray, dimensions: int, field: str) -> None:
-    if values.ndim != dimensions or not values.size or not np.isfinite(values).all():
+def _require_finite(values: FloatArray, field: str) -> None:
+    if values.ndim != 3 or not values.size or not np.isfinite(values).all():
         found = f"shape {values.shape}" if np.isfinite(values).all() else "NaN or infinity"
         raise InputError(field, "finite numbers", found, "Fill or drop what was not observed.")

@@ -88,17 +88,10 @@ def _trusted_path(take: KeyedPerformance, linear: FloatArray, targets: FloatArra
 
 
 class _Kernels:
-    """k_p between frames and the keys, without a mean over the keys, for every κ.
-
-    Parameters
-    ----------
-    keys : array, shape (K, M, 3)
-        Source frames, less their mean.
-    weights : array, shape (G, M)
-        w_pq.
-    """
+    """k_p between frames and the keys, without a mean over the keys, for every κ."""
 
     def __init__(self, keys: FloatArray, weights: FloatArray) -> None:
+        """From the keys' source (K, M, 3), less its mean, and w_pq (G, M)."""
         self.keys, self._weights = keys, weights
         self._own = self._powers(keys)
         size = self._own.mean(axis=1)

@@ -49,7 +49,14 @@ def radial_basis(X: FloatArray, labelled: IntArray, kernel: Kernel) -> Dense:
     if kernel == "linear":
         bases, affine = cdist(X, places), np.ones((len(X), 1))
     else:
-        _require_as_many_as(X, len(places))
+        needed = len(spanned_directions(X - X.mean(axis=0))) + 1
+        if len(places) < needed:
+            raise InputError(
+                "labels",
+                f"{needed} or more, as the points span space",
+                f"{len(places)}",
+                "Add labels, or use rbf-linear.",
+            )
         squared = cdist(X, places, "sqeuclidean")
         bases = 0.5 * squared * np.log(np.maximum(squared, np.finfo(np.float64).tiny))
         affine = np.column_stack([np.ones(len(X)), X @ spanned_directions(places).T])
@@ -66,15 +73,3 @@ def spanned_directions(points: FloatArray) -> FloatArray:
     """An orthonormal basis of the directions along which centred points extend, (r, D)."""
     _, extent, directions = np.linalg.svd(points, full_matrices=False)
     return np.asarray(directions[extent > FLAT * extent.max(initial=0.0)])
-
-
-def _require_as_many_as(X: FloatArray, labels: int) -> None:
-    """Refuse fewer labels than fix an affine map of the points (N, D)."""
-    needed = len(spanned_directions(X - X.mean(axis=0))) + 1
-    if labels < needed:
-        raise InputError(
-            "labels",
-            f"{needed} or more, as the points span space",
-            f"{labels}",
-            "Add labels, or use rbf-linear.",
-        )

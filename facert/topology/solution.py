@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
@@ -68,7 +68,7 @@ class Elimination:
         self._free = np.setdiff1d(np.arange(B.shape[0]), labelled)
         columns = B[:, self._free]
         self._B12 = columns[labelled]
-        self._solver = _Factor(columns[self._free], self._free)
+        self._lu = _factorised(columns[self._free], self._free) if len(self._free) else None
 
     @property
     def influence(self) -> FloatArray:
@@ -80,54 +80,48 @@ class Elimination:
         flat = labels.reshape(len(labels), -1)
         Y = np.empty((self._points, flat.shape[1]))
         Y[self._labelled] = flat
-        Y[self._free] = self._solver(-(self._B12.T @ flat))
+        Y[self._free] = self._solved(-(self._B12.T @ flat))
         return Y.reshape(self._points, *labels.shape[1:])
 
     def green(self, point: int) -> FloatArray:
         """How all points give way to a unit force on one of them, (N,): a column of B₂₂⁻¹."""
         response = np.zeros(self._points)
         force = (self._free == point).astype(np.float64)
-        response[self._free] = self._solver(force[:, None])[:, 0]
+        response[self._free] = self._solved(force[:, None])[:, 0]
         return response
+
+    def _solved(self, right: FloatArray) -> FloatArray:
+        """B₂₂⁻¹ times a matrix, of the free points."""
+        if self._lu is None:
+            return right
+        with one_thread():
+            return np.asarray(self._lu.solve(np.asfortranarray(right)))
 
 
 Interpolant = Dense | Elimination
 
 
-class _Factor:
-    """A sparse factorisation of a symmetric positive definite matrix, and its solutions.
+def _factorised(A: sparse.csc_array, points: IntArray) -> SuperLU:
+    """A sparse factorisation of a symmetric positive definite matrix, of energies at some points.
 
     SuperLU in symmetric mode: the diagonal makes good pivots, and minimum degree on A + Aᵀ keeps
     the factors small. It asks BLAS for thousands of tiny products: one thread is quickest.
     """
-
-    def __init__(self, A: sparse.csc_array, points: IntArray) -> None:
-        if not len(points):
-            return
-        diagonal = A.diagonal()
-        lost = np.flatnonzero(diagonal <= SINGULAR * diagonal.max(initial=0.0))
-        if len(lost):
-            raise _undetermined(int(points[lost[0]]))
-        try:
-            with one_thread():
-                self._lu = splu(
-                    A.tocsc(),
-                    permc_spec="MMD_AT_PLUS_A",
-                    diag_pivot_thresh=0.0,
-                    options={"SymmetricMode": True},
-                )
-        except RuntimeError as error:  # exactly singular
-            raise _undetermined(int(points[0])) from error
-        pivots = np.abs(self._lu.U.diagonal())
-        if pivots.min() <= SINGULAR * diagonal.max():
-            place = np.flatnonzero(self._lu.perm_c == pivots.argmin())[0]
-            raise _undetermined(int(points[place]))
-
-    def __call__(self, right: FloatArray) -> FloatArray:
-        if not len(right):
-            return right
+    diagonal = A.diagonal()
+    least = SINGULAR * diagonal.max()
+    lost = np.flatnonzero(diagonal <= least)
+    if len(lost):
+        raise _undetermined(int(points[lost[0]]))
+    try:
         with one_thread():
-            return np.asarray(self._lu.solve(np.asfortranarray(right)))
+            options = {"SymmetricMode": True}
+            lu = splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError as error:  # a pivot of 0
+        raise _undetermined(int(points[0])) from error
+    pivots = np.abs(lu.U.diagonal())
+    if pivots.min() <= least:
+        raise _undetermined(int(points[np.flatnonzero(lu.perm_c == pivots.argmin())[0]]))
+    return lu
 
 
 def _undetermined(point: int) -> InputError:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Rig
@@ -61,25 +62,18 @@ def spread_vertices(rig: Rig, count: int) -> IntArray:
     """
     rim, mirror = rim_vertices(rig.faces), mirror_vertices(rig.neutral)
     candidates = rim if len(rim) else np.arange(len(rig.neutral))
-    distance = np.full(len(rig.neutral), np.inf)
-    chosen: list[int] = []
-
-    def choose(vertices: list[int]) -> None:
-        chosen.extend(vertices)
-        for vertex in vertices:
-            away = np.linalg.norm(rig.neutral - rig.neutral[vertex], axis=1)
-            np.minimum(distance, away, out=distance)
-
     components = mesh_rings(rig.faces, len(rig.neutral)).components
+    chosen: list[int] = []
     middle_first = np.argsort(mirror != np.arange(len(mirror)), kind="stable")
     for first in middle_first[np.unique(components[middle_first], return_index=True)[1]]:
         if components[first] not in components[chosen]:
-            choose(_with_opposite(int(first), mirror))
+            chosen += _with_opposite(int(first), mirror)
     while len(chosen) < count:
         fitting = _fitting(candidates, mirror, count - len(chosen))
-        if distance[fitting].max(initial=0.0) <= 0:
+        distance = cdist(rig.neutral[fitting], rig.neutral[chosen]).min(axis=1)
+        if distance.max(initial=0.0) <= 0:
             break
-        choose(_with_opposite(int(fitting[distance[fitting].argmax()]), mirror))
+        chosen += _with_opposite(int(fitting[distance.argmax()]), mirror)
     return np.array(chosen, dtype=np.int64)
 
 
