@@ -86,13 +86,10 @@ class BlendMap(Map):
         poses = np.empty((len(self._used), *predicted.shape[1:]))
         poses[:-2] = predicted[:-1]
         factors = poses[-2:]  # without and with the process of their residual
-        factors[:] = self.factors(X)[0]
-        self._clip(factors)
-        factors[1] += predicted[-1]
-        self._clip(factors)
-        factors[:] = np.matmul(factors, self._matrices)
-        factors += self._offsets
-        self._clip(poses)
+        self._clip(self.factors(X)[0], factors[0])
+        self._clip(factors[0] + predicted[-1], factors[1])
+        np.add(np.matmul(factors, self._matrices), self._offsets, out=factors)
+        self._clip(poses, poses)
         pose = self._used @ poses.reshape(len(poses), -1)
         return pose.reshape(predicted.shape[1:]), lambda: self._variance(variances())
 
@@ -128,10 +125,10 @@ class BlendMap(Map):
     def _offsets(self) -> FloatArray:
         return np.stack([s.offset for s in (self.shrinkage, self.residual_shrinkage)])[:, None]
 
-    def _clip(self, poses: FloatArray) -> None:
+    def _clip(self, poses: FloatArray, out: FloatArray) -> None:
         low, high = self._ends
-        np.maximum(poses, low, out=poses)
-        np.minimum(poses, high, out=poses)
+        np.maximum(poses, low, out=out)
+        np.minimum(out, high, out=out)
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,25 +155,25 @@ class ProcessBank:
         self._of = np.array([self._place(process) for process in processes])
         self._norms = np.stack([features.norms for features in self._features])[:, None]
         theta = np.array([process.process.theta for process in processes])
-        self._theta1, self._theta2, theta3, self._theta4 = theta.T[:, :, None, None]
-        self._noise = 1.0 / theta3[:, 0]
+        self._theta1, self._theta2, theta3, theta4 = theta.T[:, :, None, None]
+        self._noise, self._half_theta4 = 1.0 / theta3[:, 0], 0.5 * theta4
         self._alpha = np.stack([process.process.alpha for process in processes])
         self._means = np.stack([process.mean for process in processes])[:, None]
         self._whitening = np.stack([process.process.whitening for process in processes])
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
         """Poses of frames X (T, d_x), (p, T, d_y), and their variances, noise included, (p, T)."""
-        products = np.empty((len(self._features), len(X), self._norms.shape[2]))
-        squares = np.empty((len(self._features), len(X), 1))
+        products = np.empty((len(self._features), len(X), self._norms.shape[2]))  # 2 φᵀφ_i
+        squares = np.empty((len(self._features), len(X), 1))  # |φ|²
         for row, features in enumerate(self._features):
             phi = features(X)
-            np.matmul(phi, features.transposed, out=products[row])
+            np.matmul(phi, features.doubled, out=products[row])
             squares[row, :, 0] = np.vecdot(phi, phi)
         distances = self._norms + squares
-        distances -= 2.0 * products
+        distances -= products
         np.maximum(distances, 0.0, out=distances)
-        k = squared_exponential(distances[self._of], self._theta1, self._theta2)
-        k += self._theta4 * products[self._of]
+        k = squared_exponential(distances.take(self._of, axis=0), self._theta1, self._theta2)
+        k += self._half_theta4 * products.take(self._of, axis=0)
         poses = np.matmul(k, self._alpha)
         poses += self._means
         return poses, lambda: self._variances(k, squares)
@@ -182,7 +182,7 @@ class ProcessBank:
         """Variances (p, T), from the kernels (p, T, n) and |φ|² of every feature (f, T, 1)."""
         whitened = np.matmul(k, self._whitening)
         explained = np.vecdot(whitened, whitened)
-        prior = self._theta1 + self._theta4 * squares[self._of]
+        prior = self._theta1 + 2.0 * self._half_theta4 * squares[self._of]
         # Rounding can take the difference below the noise, which is its least value.
         return np.asarray(self._noise + np.maximum(prior[:, :, 0] - explained, 0.0))
 
@@ -201,7 +201,7 @@ class _Features:
     def __init__(self, process: FeatureProcess) -> None:
         self._process = process
         kept = process.basis.any(axis=0)
-        self.transposed = np.ascontiguousarray(process.process.X[:, kept]).T
+        self.doubled = np.ascontiguousarray(2.0 * process.process.X[:, kept]).T
         self.norms = np.sum(process.process.X**2, axis=1)
         is_plain = np.array_equal(process.basis, np.eye(len(process.basis)))
         self._centre = process.centre
