@@ -29,9 +29,10 @@ from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.registry import make_method
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
-from facert.models.gplvm.sparse_view import SparseView
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
+from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
+from facert.models.kernels import SquaredExponential
 
 FOLDER = Path(__file__).resolve().parent
 COUNTS = (50, 100, 200, 500, 1000, 2000, 4000)
@@ -93,7 +94,13 @@ def cost(count: int, runs: int) -> Cost:
     Z = np.random.default_rng(0).normal(size=(points, LATENT))
     given = list(zip((data.X, data.Y), view_rows(LABELS, count, count), FLOORS, strict=True))
     small = [
-        SparseView(*view, latents=Z[view[1]], labelled=LABELS, inducing=INDUCING) for view in given
+        SparseView(
+            *view,
+            SquaredExponential,
+            Z[view[1][inducing_rows(len(view[1]), LABELS, INDUCING)]],
+            row_weights(len(view[1]), LABELS),
+        )
+        for view in given
     ]
     sparse = milliseconds(SharedGPLVM(*small, M, Z), runs)
     if count > MOST_EXACT:

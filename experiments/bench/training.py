@@ -19,8 +19,8 @@ from facert.methods.base import Labelled, Report, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import make_method
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
-from facert.models.optim.base import Result
 from facert.models.optim.flat import FlatObjective
+from facert.models.optim.optimiser import Result
 
 PAPER = [60.0]
 SCIPY = ("L-BFGS-B", "CG")

@@ -14,8 +14,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.models.optim.base import Result
 from facert.models.optim.monitor import Monitor
+from facert.models.optim.optimiser import Result
 from facert.settings import Settings
 
 

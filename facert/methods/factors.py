@@ -1,4 +1,4 @@
-"""Poses by the factors that frames and poses share, see `facert.models.factors.model`."""
+"""Poses by the factors that frames and poses share, see `facert.models.factors.factor_analysis`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled, stacked
 from facert.methods.regression import Map, Variance
-from facert.models.factors.censoring import ClippedMean, Limits
-from facert.models.factors.model import Evidence, learn_factors
+from facert.models.factors.censoring import CensoringLimits, ClippedMean
+from facert.models.factors.factor_analysis import FactorData, learn_factors
 
 HUGE = 1e150  # its square is finite
 
@@ -57,15 +57,15 @@ class FactorMap(Map):
             Poses of the frames without one, at which the search begins.
         """
         frames, poses = stacked(labelled, unlabelled)
-        centre, mean, limits = frames.mean(axis=0), poses.mean(axis=0), Limits.of(poses)
-        evidence = Evidence(
+        centre, mean, limits = frames.mean(axis=0), poses.mean(axis=0), CensoringLimits.of(poses)
+        data = FactorData(
             labelled.X - centre,
             labelled.Y - mean,
             unlabelled.X - centre,
             unlabelled.Y - mean,
-            Limits(limits.low - mean, limits.high - mean),
+            CensoringLimits(limits.low - mean, limits.high - mean),
         )
-        factors = learn_factors(evidence, guess - mean)
+        factors = learn_factors(data, guess - mean)
         weights, spread = factors.regression()
         bounds = np.stack([limits.low, limits.high])
         censored = np.isfinite(bounds)
@@ -92,4 +92,4 @@ class FactorMap(Map):
     @cached_property
     def _clipped(self) -> ClippedMean:
         low, high = np.where(self.censored > 0, self.limits, [[-np.inf], [np.inf]])
-        return ClippedMean(Limits(low, high), self.spread)
+        return ClippedMean(CensoringLimits(low, high), self.spread)

@@ -1,4 +1,4 @@
-"""How much noise to expect in a capture when nobody says.
+"""The noise and motion of a capture, estimated where the settings leave them open.
 
 To a model of q latent dimensions, whatever q directions cannot carry is noise, be it of the
 measurement or of motion too small to model. Its variance in one direction is estimated by the
@@ -19,7 +19,7 @@ from facert.settings import Settings
 # predictive variance vanishes, see facert.models.kernels); above the second, small motion is lost.
 LEAST, MOST = 0.03, 0.1
 STEP = 0.3
-"""How far a face moves from frame to frame when nobody knows, normalised units."""
+"""Motion of a face from frame to frame where it is not given, normalised units."""
 
 
 def expected_noise(X: FloatArray, latent_dim: int) -> float:

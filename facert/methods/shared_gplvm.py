@@ -11,13 +11,12 @@ from __future__ import annotations
 import hashlib
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import copy
 from functools import partial
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray, rms
@@ -29,18 +28,18 @@ from facert.methods.views import view_arrays, view_from
 from facert.models.device import find_device
 from facert.models.gp.posterior import Predictor
 from facert.models.gp.sparse import ApproximationName
-from facert.models.gplvm.alignment import align, principal_components
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.fitting import train
+from facert.models.gplvm.initial_latents import align, principal_components
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.gplvm.source_mapping import Mapped, Observation, SourceMapping
-from facert.models.gplvm.sparse_view import SparseView
+from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
 from facert.models.gplvm.staging import Core, Start
 from facert.models.gplvm.target_mapping import map_to_target
-from facert.models.gplvm.training import train
 from facert.models.kernels import kernel_class
-from facert.models.optim.base import Result
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
+from facert.models.optim.optimiser import Result
 from facert.models.optim.scg import SCG
 from facert.models.threads import threads_for
 from facert.settings import OptimiserName, Settings
@@ -70,6 +69,8 @@ class SemiSupervisedSGPLVM:
 
     most_unlabelled: ClassVar[int | None] = 100  # more do no harm, help little and take time
     stepwise: ClassVar[bool] = True
+    supervised: ClassVar[bool] = False
+    """Whether the labelled frames alone are used, and P(Z) is standard normal."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = self._given = settings
@@ -81,7 +82,7 @@ class SemiSupervisedSGPLVM:
 
     @property
     def dimensions(self) -> tuple[int, int]:
-        """d_x and d_y of what it was trained on."""
+        """d_x and d_y of the training data."""
         return self.source_.columns, self.target_.columns
 
     def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
@@ -99,8 +100,10 @@ class SemiSupervisedSGPLVM:
         labelled, unlabelled : Labelled, Unlabelled
             Normalised and complete.
         monitor : Monitor, optional
-            Watches the iterations and keeps checkpoints.
+            Follows the iterations and keeps checkpoints.
         """
+        if self.supervised:
+            unlabelled = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
         X, Y = stacked(labelled, unlabelled)
         count = len(labelled.X)
         self.settings = with_noise(self._given, X)
@@ -136,12 +139,8 @@ class SemiSupervisedSGPLVM:
         return _SharedStream(self)
 
     def save(self) -> dict[str, FloatArray]:
-        """Both trained views: what mapping needs of them, see `facert.methods.views`."""
-        arrays: dict[str, FloatArray] = {}
-        for view, predictor in (("source", self.source_), ("target", self.target_)):
-            for name, array in view_arrays(predictor).items():
-                arrays[f"{view}.{name}"] = array
-        return arrays
+        """The arrays of both trained views, see `facert.methods.views`."""
+        return view_arrays(self.source_, "source") | view_arrays(self.target_, "target")
 
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned.
@@ -153,16 +152,11 @@ class SemiSupervisedSGPLVM:
         """
         if self.settings.sigma_c is None or self.settings.sigma_t is None:
             raise InputError("settings", "numbers as sigma_c and sigma_t", "none", DAMAGED)
-        views = [
-            view_from(arrays, name, kernel)
-            for name, kernel in zip(("source", "target"), self._kernels, strict=True)
-        ]
-        if views[0].Z.shape[1] != views[1].Z.shape[1]:
-            dimensions = [view.Z.shape[1] for view in views]
-            raise InputError(
-                "target.latents", f"{dimensions[0]} dimensions", f"{dimensions[1]}", DAMAGED
-            )
-        self._set_views(*views)
+        source, target = map(view_from, (arrays, arrays), ("source", "target"), self._kernels)
+        q, found = source.Z.shape[1], target.Z.shape[1]
+        if found != q:
+            raise InputError("target.latents", f"{q} dimensions", f"{found}", DAMAGED)
+        self._set_views(source, target)
 
     def _set_views(self, source: Predictor, target: Predictor) -> None:
         self.source_, self.target_ = source, target
@@ -194,41 +188,34 @@ class SemiSupervisedSGPLVM:
         begin = self._begin
         if begin is None and likelihood != "exact":
             begin = self._trained_core(X, Y, labelled)
-        M = self._constraints(X, Y, labelled)
-        Z = self._aligned(X, Y, M, latent_dim) if begin is None else begin.latents(X, Y, labelled)
-        views = self._views(X, Y, labelled, Z, likelihood)
+        M = None
+        if not self.supervised:
+            M = constraint_matrix(X, Y, labelled, self.settings.neighbours)  # Eq. (6)
         if begin is not None:
-            for view, kernel in zip(views, begin.kernels, strict=True):
-                view.begin_with(kernel)
-        return SharedGPLVM(*views, M, Z)
+            Z = begin.latents(X, Y, labelled)
+        elif M is not None:
+            Z = align(M, latent_dim)
+        else:
+            Z = principal_components(np.hstack([X, Y]), latent_dim)
+        source, target = self._views(X, Y, labelled, Z, likelihood)
+        if begin is not None:
+            source.begin_with(begin.kernels[0])
+            target.begin_with(begin.kernels[1])
+        return SharedGPLVM(source, target, M, Z)
 
     def _views(
-        self,
-        X: FloatArray,
-        Y: FloatArray,
-        labelled: int,
-        Z: FloatArray,
-        likelihood: ChosenLikelihood,
-    ) -> tuple[GaussianView, GaussianView]:
-        settings = self.settings
-        assert settings.source_noise_floor is not None  # filled in before
-        floors = settings.source_noise_floor, settings.target_noise_floor
+        self, X: FloatArray, Y: FloatArray, labelled: int, Z: FloatArray, chosen: ChosenLikelihood
+    ) -> Iterator[GaussianView]:
+        """The source view and the target view."""
+        assert self.settings.source_noise_floor is not None  # filled in before
+        floors = self.settings.source_noise_floor, self.settings.target_noise_floor
         rows = view_rows(labelled, len(X) - labelled, len(Y) - labelled)
-        given = zip((X, Y), rows, floors, self._kernels, strict=True)
-        if likelihood == "exact":
-            source, target = (GaussianView(*view) for view in given)
-            return source, target
-        source, target = (
-            SparseView(
-                *view,
-                latents=Z[view[1]],
-                labelled=labelled,
-                inducing=settings.inducing,
-                approximation=likelihood,
-            )
-            for view in given
-        )
-        return source, target
+        for view in zip((X, Y), rows, floors, self._kernels, strict=True):
+            if chosen == "exact":
+                yield GaussianView(*view)
+            else:
+                inducing = Z[view[1][inducing_rows(len(view[1]), labelled, self.settings.inducing)]]
+                yield SparseView(*view, inducing, row_weights(len(view[1]), labelled), chosen)
 
     def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int) -> Start:
         core = Core.of(X, Y, labelled)
@@ -239,7 +226,7 @@ class SemiSupervisedSGPLVM:
         return Start.at(*small.posteriors())
 
     def _likelihood(self, X: FloatArray, Y: FloatArray, labelled: int) -> ChosenLikelihood:
-        """The setting; where that is left open, exact while there is no more than a core."""
+        """The setting; where it is ``"auto"``, exact while there is no more than a core."""
         if self.settings.likelihood != "auto":
             return self.settings.likelihood
         return "exact" if Core.of(X, Y, labelled).is_all_of(X, Y) else "vfe"
@@ -249,21 +236,6 @@ class SemiSupervisedSGPLVM:
         if latent_dim < self.settings.latent_dim:
             log.warning("%d points carry only %d latent dimensions", points, latent_dim)
         return latent_dim
-
-    def _constraints(self, X: FloatArray, Y: FloatArray, labelled: int) -> csr_array | None:
-        """Of the latent prior, Eq. (6)."""
-        return constraint_matrix(X, Y, labelled, self.settings.neighbours)
-
-    def _aligned(
-        self,
-        X: FloatArray,  # noqa: ARG002  the constraints know them
-        Y: FloatArray,  # noqa: ARG002
-        M: csr_array | None,
-        latent_dim: int,
-    ) -> FloatArray:
-        """Latents that satisfy the constraints best."""
-        assert M is not None
-        return align(M, latent_dim)
 
     def _train(self, module: SharedGPLVM, fingerprint: str, monitor: Monitor) -> Result:
         return train(
@@ -288,29 +260,7 @@ class SemiSupervisedSGPLVM:
 class SupervisedSGPLVM(SemiSupervisedSGPLVM):
     """Ek (2009): the labelled frames alone, with P(Z) = N(0, I), begun at principal components."""
 
-    def fit(
-        self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
-    ) -> Report:
-        """Train on the labelled frames; the unlabelled data is not used."""
-        nothing = Unlabelled(unlabelled.X[:0], unlabelled.Y[:0])
-        return super().fit(labelled, nothing, monitor)
-
-    def _constraints(
-        self,
-        X: FloatArray,  # noqa: ARG002
-        Y: FloatArray,  # noqa: ARG002
-        labelled: int,  # noqa: ARG002
-    ) -> None:
-        return None
-
-    def _aligned(
-        self,
-        X: FloatArray,
-        Y: FloatArray,
-        M: csr_array | None,  # noqa: ARG002
-        latent_dim: int,
-    ) -> FloatArray:
-        return principal_components(np.hstack([X, Y]), latent_dim)
+    supervised = True
 
 
 class _SharedStream:
@@ -333,7 +283,7 @@ class _SharedStream:
 
 
 def _fingerprint(X: FloatArray, Y: FloatArray, settings: Settings) -> str:
-    """What a checkpoint must agree with; rounded, so that another machine agrees as well."""
+    """A digest that a checkpoint must agree with; rounded, so that other machines agree as well."""
     digest = hashlib.sha256()
     for array in (X, Y):
         digest.update((np.round(array, 6) + 0.0).tobytes())  # no -0.0

@@ -1,7 +1,7 @@
-"""What a model file holds of a trained view of the shared models.
+"""A trained view of the shared models as the arrays of a model file.
 
-An exact view is its latents and observations, from which the rest is made again; a sparse one its
-inducing latents and what they predict, whatever number of frames it was learned from.
+An exact view is its latents and observations, from which the rest is computed again; a sparse one
+its inducing latents and their weights, however many frames it was trained on.
 """
 
 from __future__ import annotations
@@ -20,16 +20,18 @@ EXACT = {"latents": "nq", "observations": "nd", "kernel": "3"}
 SPARSE = {"latents": "mq", "whitener": "mm", "weights": "md", "kernel": "3"}
 
 
-def view_arrays(view: Predictor) -> dict[str, FloatArray]:
-    """The arrays of a view by their names."""
+def view_arrays(view: Predictor, name: str) -> dict[str, FloatArray]:
+    """The arrays of a view, whose name stands before theirs."""
     kernel = view.kernel
     arrays = {
         "latents": view.Z,
         "kernel": np.array([kernel.variance, kernel.inverse_width, kernel.noise]),
     }
     if isinstance(view, Posterior):
-        return arrays | {"observations": view.X}
-    return arrays | {"whitener": view.whitener, "weights": np.ascontiguousarray(view.alpha)}
+        arrays["observations"] = view.X
+    else:
+        arrays |= {"whitener": view.whitener, "weights": np.ascontiguousarray(view.alpha)}
+    return {f"{name}.{part}": array for part, array in arrays.items()}
 
 
 def view_from(arrays: Mapping[str, FloatArray], name: str, kernel_type: type[Kernel]) -> Predictor:

@@ -1,1 +1,1 @@
-"""The mathematics, arrays in and arrays out: it knows nothing of takes, files or terminals."""
+"""The mathematics, arrays in and arrays out: without takes, files or terminals."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 
-LEAST_DIRECTIONS = 12  # to tell noise from motion by
+LEAST_DIRECTIONS = 12  # to separate noise from motion
 EPSILON = 1e-5  # ε: directions smaller than this fade out, whatever the noise
 
 

@@ -13,8 +13,8 @@ from facert.data.arrays import FloatArray
 from facert.data.version import CREATED_BY
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import read_tensors, write_tensors
-from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor, Progress
+from facert.models.optim.optimiser import State
 
 log = logging.getLogger(__name__)
 

@@ -37,7 +37,7 @@ def train(
     settings : Settings, optional
         By default those of the start, else a blend of experts, see `facert.methods.blend`.
     monitor : Monitor, optional
-        Watches the training; see `facert.models.gplvm.training`.
+        Watches the training; see `facert.models.gplvm.fitting`.
     start : Retargeter, optional
         What a shared model begins at, as after a label was added to the take that it was trained
         on: frames and poses that it knows keep their latent coordinates, and a few iterations

@@ -5,8 +5,8 @@ import pytest
 
 from facert.errors import InputError, OutputExistsError
 from facert.io.tensors import write_tensors
-from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor, Progress
+from facert.models.optim.optimiser import State
 from facert.models.optim.scg import SCG
 from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
 

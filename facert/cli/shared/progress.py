@@ -18,8 +18,8 @@ from rich.progress import (
 )
 
 from facert.cli.shared import console
-from facert.models.optim.base import State
 from facert.models.optim.monitor import Monitor
+from facert.models.optim.optimiser import State
 
 Thing = TypeVar("Thing")
 

@@ -1,13 +1,13 @@
-"""Poses at a limit say "at least so far": the model of Tobin (1958) for the controls of a rig.
+"""Poses at a limit are censored: the model of Tobin (1958) for the controls of a rig.
 
 A control that ends at 0 or 1 spends much of a performance there, half of the time in some rigs. A
-linear model bends itself in vain to say exactly 0 in all those frames. So the pose is taken to be
-what limits leave of a *free* pose,
+linear model bends itself in vain to predict exactly 0 in all those frames. So the pose is taken to
+be a *free* pose clipped to its limits,
 
     y = min(max(y*, low), high),      y* ~ N(m, s²):
 
-an entry at its limit stands for any y* beyond, of which a model m, s tells mean and variance, and
-what is to be expected of y is the mean of the clipped y*.
+an entry at its limit stands for any y* beyond, whose mean and variance follow from the model m, s,
+and the expectation of y is the mean of the clipped y*.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class CensoringLimits:
     """How far controls go, infinite where poses do not pile up.
 
     Parameters
@@ -41,7 +41,7 @@ class Limits:
     high: FloatArray
 
     @classmethod
-    def of(cls, poses: FloatArray) -> Limits:
+    def of(cls, poses: FloatArray) -> CensoringLimits:
         """Limits at which poses (n, d_y) pile up."""
         low, high = poses.min(axis=0), poses.max(axis=0)
         slack = TOLERANCE * (high - low)
@@ -53,18 +53,18 @@ class Limits:
 
 
 class ClippedMean:
-    """The mean E[y] of what limits leave of free poses y* ~ N(m, s²).
+    """The mean E[y] of free poses y* ~ N(m, s²) clipped to limits.
 
     With r(t) = E[max(t + s ε, 0)] = t Φ(t/s) + s φ(t/s), it is m + r(low - m) - r(m - high).
 
     Parameters
     ----------
-    limits : Limits
+    limits : CensoringLimits
     std : array, shape (d_y,)
         s.
     """
 
-    def __init__(self, limits: Limits, std: FloatArray) -> None:
+    def __init__(self, limits: CensoringLimits, std: FloatArray) -> None:
         # low - m and m - high are the same with other signs.
         self._signed_std = np.array([[[1.0]], [[-1.0]]]) * std
         ends = np.stack([limits.low, limits.high])[:, None]
@@ -100,7 +100,7 @@ class CensoredPoses:
     columns: IntArray
 
     @classmethod
-    def of(cls, poses: FloatArray, limits: Limits) -> CensoredPoses:
+    def of(cls, poses: FloatArray, limits: CensoringLimits) -> CensoredPoses:
         """Find the entries of poses (n, d_y) that are at or beyond a limit."""
         slack = TOLERANCE * np.ptp(poses, axis=0, keepdims=True) if len(poses) else 0.0
         low: BoolArray = poses <= limits.low + slack
@@ -109,7 +109,7 @@ class CensoredPoses:
         return cls(poses, np.where(low[rows, columns], 1.0, -1.0), rows, columns)
 
     def free(self, mean: FloatArray, std: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What a model expects the free poses to be, (n, d_y), and their summed variances, (d_y,).
+        """The expected free poses under a model, (n, d_y), and their summed variances, (d_y,).
 
         Parameters
         ----------

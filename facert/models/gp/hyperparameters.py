@@ -2,9 +2,8 @@
 
     k(x, x') = θ1 exp(-θ2/2 |x - x'|²) + θ4 xᵀx' + θ3⁻¹ δ,
 
-the squared exponential of Eq. (3) in Bouaziz and Pauly (2014), to which the linear term adds what
-extrapolates. All columns of the target share it. Inputs are fixed, so that distances and products
-are computed once.
+the squared exponential of Eq. (3) in Bouaziz and Pauly (2014), and a linear term that extrapolates.
+All columns of the target share it. Inputs are fixed: distances and products are computed once.
 
 Parameters are found on the *profile* of the likelihood (Rasmussen and Williams 2006, section
 5.4.1, with the scale maximised out). Write K = s R with

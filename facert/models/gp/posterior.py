@@ -28,7 +28,7 @@ def namespace(array: FloatArray) -> Any:
 
 @dataclass(frozen=True)
 class PosteriorPoint:
-    """Mean and variance at B positions, with what their derivatives need.
+    """Mean and variance at B positions, with the terms that their derivatives need.
 
     Parameters
     ----------

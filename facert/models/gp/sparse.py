@@ -7,7 +7,7 @@ that between them and the rows, every column of X is drawn from N(0, Q + Λ), Λ
   is added. The result is never below the exact value, and more positions never make it worse.
 * `FITC` (Snelson and Ghahramani 2006): Λ = diag(K - Q) + s I, so that the variance of each row is
   right. The diagonal then does the work of the noise, which the likelihood takes to zero where it
-  can (see `facert.models.kernels` for what that does): FITC is for use with a noise floor, as the
+  can (see `facert.models.kernels` for the consequence): FITC is for use with a noise floor, as the
   shared models always have one.
 
 A row may have a weight w and then counts as w rows that are alike; Λ is divided by it. With the
@@ -45,7 +45,7 @@ JITTER = 1e-10
 
 @dataclass(frozen=True)
 class Residual:
-    """The variance that the inducing positions leave of the rows, and what a row weighs.
+    """The variance that the inducing positions leave of the rows, with their weights.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class FITC:
     """The fully independent training conditional."""
 
     def diagonal(self, residual: Residual) -> Tensor:
-        """The noise and what is residual."""
+        """The noise and the residual."""
         return (residual.variance + residual.noise) / residual.weights
 
     def penalty(self, residual: Residual) -> Tensor:

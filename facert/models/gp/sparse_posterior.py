@@ -1,4 +1,4 @@
-"""What a sparse Gaussian process predicts: from its inducing positions alone.
+"""The predictions of a sparse Gaussian process, from its inducing positions alone.
 
 With the factors of `facert.models.gp.sparse`, the mean and the variance at a new position are kᵀα
 and θ1 + θ3⁻¹ - kᵀ L⁻ᵀ (I - B⁻¹) L⁻¹ k, k the kernel against the m inducing positions and
@@ -28,7 +28,7 @@ def sparse_posterior(
     approximation: ApproximationName = "vfe",
     weights: FloatArray | None = None,
 ) -> Predictor:
-    """The process given its training data, as the inducing positions see it.
+    """The process given its training data, by its inducing positions.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 The formulas are those of `facert.models.gplvm.source_mapping`, whose batches take twice as long
 for a single frame; tests hold the two against each other. Where a frame is followed from its
-predecessor's z two or three steps lead to the minimum, and what they cost is mostly the calls, not
-the arithmetic. So everything that is multiplied by [Tᵀ | α] is one product,
+predecessor's z two or three steps lead to the minimum, and their cost is mostly that of the calls,
+not of the arithmetic. So everything that is multiplied by [Tᵀ | α] is one product,
 
     G [Tᵀ | α] = [H | J],       G = ∂k/∂z,      H = G Tᵀ,       J = ∂μ/∂z,
 
@@ -12,7 +12,7 @@ F in k, and G times it the slope in z. Frames that need more than plain steps, d
 positive definite Hessian, are left to the general method.
 
 G, H and J depend on z alone. So the first step of a frame is taken from where the last one of its
-predecessor was: what is known there is used again.
+predecessor was, with the view that was linearised there.
 """
 
 from __future__ import annotations

@@ -80,14 +80,15 @@ def constraint_matrix(X: FloatArray, Y: FloatArray, labelled: int, k: int) -> sp
     csr_array, shape (l + m + l + n, l + m + n)
         Each row times the latent coordinates is one reconstruction residual.
     """
-    residual_X = sparse.eye_array(len(X)) - reconstruction_weights(X, k)
-    residual_Y = sparse.eye_array(len(Y)) - reconstruction_weights(Y, k)
-    blocks = [
-        [residual_X[:, :labelled], residual_X[:, labelled:], None],
-        [residual_Y[:, :labelled], None, residual_Y[:, labelled:]],
-    ]
-    # A view without rows of its own has no block at all: None would leave its size open.
-    m, n = len(X) - labelled, len(Y) - labelled
-    blocks[0][2] = sparse.csr_array((len(X), n))
-    blocks[1][1] = sparse.csr_array((len(Y), m))
-    return sparse.block_array(blocks, format="csr")
+    rows = view_rows(labelled, len(X) - labelled, len(Y) - labelled)
+    places = sparse.eye_array(len(X) + len(Y) - labelled, format="csr")
+    residuals = [sparse.eye_array(len(U)) - reconstruction_weights(U, k) for U in (X, Y)]
+    blocks = [residual @ places[own] for residual, own in zip(residuals, rows, strict=True)]
+    M: sparse.csr_array = sparse.vstack(blocks, format="csr")
+    return M
+
+
+def view_rows(labelled: int, source_only: int, target_only: int) -> tuple[IntArray, IntArray]:
+    """The rows of the latent coordinates that belong to source and target, labelled ones first."""
+    rows = np.arange(labelled + source_only + target_only)
+    return rows[: labelled + source_only], np.delete(rows, slice(labelled, labelled + source_only))

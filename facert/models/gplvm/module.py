@@ -83,7 +83,7 @@ class SharedGPLVM(nn.Module):
     Parameters
     ----------
     source, target : GaussianView
-        Of the rows that `view_rows` gives them.
+        Of the rows of `facert.models.gplvm.lle.view_rows`.
     M : csr_array, shape (constraints, l + m + n), or None
         Reconstruction constraints of the latent prior, Eq. (6). None leaves P(Z) = N(0, I), the
         supervised model of Ek (2009).
@@ -126,9 +126,3 @@ class SharedGPLVM(nn.Module):
         """Both views given their observations, for source and for target mapping."""
         source, target = (view.posterior(self.latents(view)) for view in (self.source, self.target))
         return source, target
-
-
-def view_rows(labelled: int, source_only: int, target_only: int) -> tuple[IntArray, IntArray]:
-    """The rows of the latent coordinates that source and target see, labelled ones first."""
-    rows = np.arange(labelled + source_only + target_only)
-    return rows[: labelled + source_only], np.delete(rows, slice(labelled, labelled + source_only))

@@ -60,7 +60,7 @@ def chunks_of(frames: int, view: Predictor) -> Iterator[slice]:
 
 @dataclass(frozen=True)
 class Observation:
-    """What is known of the source at B frames, in normalised units.
+    """The observed source at B frames, in normalised units.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ Eq. (1) or (2) is replaced by the bound of `facert.models.gp.sparse`: an evaluat
 proportion to the rows of a view, and mapping depends on its inducing latents alone. They are
 trained with the rest.
 
-Where unlabelled rows outnumber the labels many times, what the labels show of both views together
-is lost beside what each view shows alone. The unlabelled rows of a view therefore weigh no more
+Where unlabelled rows outnumber the labels many times, the correspondence that the labels show is
+lost beside the structure of each view. The unlabelled rows of a view therefore weigh no more
 than `MOST_COUNTED` rows, all together, however many there are.
 """
 
@@ -21,7 +21,7 @@ from facert.models.gp.sparse import ApproximationName, sparse_negative_log_likel
 from facert.models.gp.sparse_posterior import sparse_posterior
 from facert.models.gplvm.module import GaussianView
 from facert.models.gplvm.staging import spread
-from facert.models.kernels import Kernel, SquaredExponential
+from facert.models.kernels import Kernel
 
 MOST_COUNTED = 100.0
 
@@ -33,13 +33,10 @@ class SparseView(GaussianView):
     ----------
     observations, rows, noise_floor, kernel
         As of `GaussianView`.
-    latents : array, shape (n, q)
-        Initial latent coordinates of its rows.
-    labelled : int
-        How many of them, in front, are labelled.
-    inducing : int
-        Inducing latents; all rows where there are fewer. They begin at labelled rows and others
-        spread over the view.
+    inducing : array, shape (m, q)
+        Initial inducing latents, see `inducing_rows`.
+    weights : Tensor, shape (n,)
+        Of the rows, see `row_weights`.
     approximation : {"vfe", "fitc"}
         See `facert.models.gp.sparse`.
     """
@@ -51,18 +48,15 @@ class SparseView(GaussianView):
         observations: FloatArray,
         rows: IntArray,
         noise_floor: float,
-        kernel: type[Kernel] = SquaredExponential,
-        *,
-        latents: FloatArray,
-        labelled: int,
-        inducing: int,
+        kernel: type[Kernel],
+        inducing: FloatArray,
+        weights: Tensor,
         approximation: ApproximationName = "vfe",
     ) -> None:
         super().__init__(observations, rows, noise_floor, kernel)
         self.approximation = approximation
-        self.register_buffer("weights", row_weights(len(rows), labelled))
-        begin = inducing_rows(len(rows), labelled, inducing)
-        self.inducing = nn.Parameter(torch.from_numpy(latents[begin]))
+        self.register_buffer("weights", weights)
+        self.inducing = nn.Parameter(torch.from_numpy(np.array(inducing)))
 
     def value_and_gradient(self, Z: Tensor) -> tuple[Tensor, ...]:
         """The bound in place of the likelihood; see `GaussianView`."""
@@ -92,13 +86,16 @@ class SparseView(GaussianView):
 
 
 def row_weights(rows: int, labelled: int) -> Tensor:
-    """1 for labelled rows, and for the others what makes them count as `MOST_COUNTED` at most."""
+    """Weights: 1 for labelled rows, and for the others so much that `MOST_COUNTED` is their sum."""
     weights = torch.ones(rows, dtype=torch.float64)
     weights[labelled:] = min(1.0, MOST_COUNTED / max(rows - labelled, 1))
     return weights
 
 
 def inducing_rows(rows: int, labelled: int, count: int) -> IntArray:
-    """The rows at which inducing latents begin: labelled ones, and others evenly after them."""
+    """The rows of a view at which so many inducing latents begin, or all where there are fewer.
+
+    They are labelled ones, and others spread evenly over the rest.
+    """
     labels = spread(0, labelled, count)
     return np.concatenate([labels, spread(labelled, rows, count - len(labels))])

@@ -12,7 +12,7 @@ from facert.models.gplvm.source_mapping import Mapped, chunks_of
 def map_to_target(posterior: Predictor, mapped: Mapped) -> tuple[FloatArray, FloatArray]:
     """Most probable parameters and their standard deviation.
 
-    The variance is that of the target view at z* plus what the uncertainty of z* itself brings,
+    The variance is that of the target view at z* plus that by the uncertainty of z*,
     J_yᵀ (∇²F)⁻¹ J_y in the Laplace approximation: hidden markers widen it.
     In a stream the previous frame's x* counts as exact, so that the std of a long gap is too small.
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from facert.data.arrays import FloatArray
-from facert.models.optim.base import Objective, State, Watcher, initial_state
+from facert.models.optim.optimiser import Objective, State, Watcher, initial_state
 
 
 class LBFGS:
@@ -57,7 +57,7 @@ class LBFGS:
 
 
 class _Stage:
-    """One run of SciPy's minimiser: what it is told, and the state it has come to."""
+    """One run of SciPy's minimiser: its objective, and the state it has come to."""
 
     def __init__(self, objective: Objective, state: State, watch: Watcher) -> None:
         self.objective, self.state, self.watch = objective, state, watch

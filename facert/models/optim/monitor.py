@@ -1,10 +1,10 @@
-"""What watches a minimisation, and what a stopped one needs to go on."""
+"""The progress of a minimisation, and a monitor that follows it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from facert.models.optim.base import State
+from facert.models.optim.optimiser import State
 
 # The relative change is averaged over so many iterations: one short step is not convergence.
 WINDOW = 5
@@ -12,7 +12,7 @@ WINDOW = 5
 
 @dataclass(frozen=True)
 class Progress:
-    """All that a stopped run needs to go on.
+    """The progress of a run, from which a stopped one goes on.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Progress:
 
 
 class Monitor:
-    """What watches a training run; this one does nothing.
+    """A monitor of a training run; this one does nothing.
 
     Subclasses draw a progress bar, write checkpoints, log the curve.
     """

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.models.optim.base import Objective, State, Watcher, initial_state
+from facert.models.optim.optimiser import Objective, State, Watcher, initial_state
 
 SIGMA = 1e-5  # step of the finite difference that gives the curvature, relative to 1/|p|
 SCALE_START, SCALE_MIN, SCALE_MAX = 1e-6, 1e-15, 1e20  # Møller's λ
@@ -19,7 +19,7 @@ INFINITELY_WORSE = -3.0
 
 @dataclass(frozen=True)
 class _Memory:
-    """What the next iteration needs besides x; curvature along p is known after a rejection."""
+    """State of the search besides x; the curvature along p is known after a rejection."""
 
     gradient: FloatArray
     direction: FloatArray

@@ -5,11 +5,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm, truncnorm
 
-from facert.models.factors.censoring import CensoredPoses, ClippedMean, Limits
+from facert.models.factors.censoring import CensoredPoses, CensoringLimits, ClippedMean
 
 
 def limits(low, high):
-    return Limits(np.array([low]), np.array([high]))
+    return CensoringLimits(np.array([low]), np.array([high]))
 
 
 @pytest.mark.parametrize("std", [0.12, 1.0, 3.0])
@@ -35,7 +35,7 @@ def test_far_beyond_a_limit_nothing_is_lost_to_rounding():
 
 def test_poses_between_the_limits_are_known():
     poses = np.array([[0.0, 0.2], [0.7, 1.0], [1.0, 0.5]])
-    known = Limits(np.array([0.0, -np.inf]), np.array([np.inf, 1.0]))
+    known = CensoringLimits(np.array([0.0, -np.inf]), np.array([np.inf, 1.0]))
     free, variance = CensoredPoses.of(poses, known).free(np.full((3, 2), 0.5), np.ones(2))
 
     np.testing.assert_array_equal(free != poses, [[True, False], [False, True], [False, False]])
@@ -67,13 +67,13 @@ def test_a_limit_is_where_poses_pile_up():
     often_open = np.where(rng.random(100) < 0.5, 1.0, inside)
     rarely_closed = np.where(np.arange(100) < 10, 0.0, inside)
     poses = np.column_stack([inside, half_closed, often_open, rarely_closed, np.full(100, 0.3)])
-    found = Limits.of(poses)
+    found = CensoringLimits.of(poses)
 
     np.testing.assert_array_equal(found.low, [-np.inf, 0.0, -np.inf, -np.inf, -np.inf])
     np.testing.assert_array_equal(found.high, [np.inf, np.inf, 1.0, np.inf, np.inf])
 
 
 def test_of_a_few_poses_the_lowest_and_the_highest_are_no_limits():
-    found = Limits.of(np.random.default_rng(0).normal(size=(4, 3)))
+    found = CensoringLimits.of(np.random.default_rng(0).normal(size=(4, 3)))
     assert np.isneginf(found.low).all()
     assert np.isposinf(found.high).all()

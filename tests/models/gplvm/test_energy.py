@@ -7,9 +7,9 @@ import torch
 from facert.errors import NumericalError
 from facert.models.closed_form import closed_form
 from facert.models.gplvm import prior
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
-from facert.models.gplvm.sparse_view import SparseView
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
+from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
 from facert.models.kernels import KERNELS, SquaredExponential
 
 LATENT = 3
@@ -26,8 +26,9 @@ def make_module(
     def view(observations, rows, noise_floor):
         if inducing is None:
             return GaussianView(observations, rows, noise_floor, kernel)
-        options = {"latents": Z[rows], "labelled": labelled, "inducing": inducing}
-        return SparseView(observations, rows, noise_floor, kernel, **options)
+        first = Z[rows[inducing_rows(len(rows), labelled, inducing)]]
+        weights = row_weights(len(rows), labelled)
+        return SparseView(observations, rows, noise_floor, kernel, first, weights)
 
     rows = view_rows(labelled, source, target)
     return SharedGPLVM(*map(view, (X, Y), rows, (0.01, 0.05)), M, Z)

@@ -3,8 +3,8 @@ import pytest
 import torch
 from scipy.stats import multivariate_normal
 
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
 
 LABELLED, SOURCE, TARGET, LATENT = 4, 3, 2, 2
 FLOOR_X, FLOOR_Y = 0.01, 0.05

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.gplvm.sparse_view import MOST_COUNTED, SparseView, inducing_rows, row_weights
+from facert.models.kernels import SquaredExponential
 
 LABELLED, SOURCE, TARGET, LATENT = 5, 12, 8, 2
 FLOORS = 0.01, 0.05
@@ -24,11 +25,16 @@ def Z():
 def both(X, Y, Z, inducing, **options):
     M = constraint_matrix(X, Y, LABELLED, 3)
     given = list(zip((X, Y), view_rows(LABELLED, SOURCE, TARGET), FLOORS, strict=True))
-    options |= {"labelled": LABELLED, "inducing": inducing}
     return (
         SharedGPLVM(*(GaussianView(*view) for view in given), M, Z),
-        SharedGPLVM(*(SparseView(*view, latents=Z[view[1]], **options) for view in given), M, Z),
+        SharedGPLVM(*(sparse_view(*view, Z, inducing, **options) for view in given), M, Z),
     )
+
+
+def sparse_view(observations, rows, floor, Z, inducing, **options):
+    first = Z[rows[inducing_rows(len(rows), LABELLED, inducing)]]
+    weights = row_weights(len(rows), LABELLED)
+    return SparseView(observations, rows, floor, SquaredExponential, first, weights, **options)
 
 
 @pytest.mark.parametrize("approximation", ["vfe", "fitc"])

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from facert.models.gplvm.alignment import align
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
+from facert.models.gplvm.fitting import train
+from facert.models.gplvm.initial_latents import align
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, Start, spread
-from facert.models.gplvm.training import train
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
 

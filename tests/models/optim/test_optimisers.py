@@ -138,7 +138,7 @@ def test_infinite_values_behind_a_wall_are_survived(optimiser, wall):
 
 
 def test_a_long_step_into_infinity_is_cut_at_once(optimiser):
-    """x - log x, infinite for x <= 0, whose curvature at 20 says nothing of the wall."""
+    """x - log x, infinite for x <= 0, whose curvature at 20 does not show the wall."""
 
     def barrier(x):
         if (x <= 0).any():

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from facert.models.gplvm.alignment import align
-from facert.models.gplvm.lle import constraint_matrix
-from facert.models.gplvm.module import GaussianView, SharedGPLVM, view_rows
-from facert.models.gplvm.training import train
-from facert.models.optim.base import State
+from facert.models.gplvm.fitting import train
+from facert.models.gplvm.initial_latents import align
+from facert.models.gplvm.lle import constraint_matrix, view_rows
+from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor, Progress
+from facert.models.optim.optimiser import State
 from facert.models.optim.scg import SCG
 
 OPTIONS = {
@@ -152,7 +152,7 @@ def test_the_decrease_is_judged_by_the_magnitude_that_is_given(optimiser):
 @pytest.mark.parametrize(
     ("curve", "converged"),
     [
-        ([100.0] * 5, False),  # too short to tell
+        ([100.0] * 5, False),  # too short to judge
         ([100.0] * 6, True),
         ([100.0 - i for i in range(10)], False),
         ([100.0, 100.0, 100.0, 100.0, 100.0, 90.0], False),  # one long step after short ones

@@ -10,15 +10,15 @@ from scipy.stats import multivariate_normal
 
 from facert.data.arrays import rms
 from facert.methods.linear import Ridge
-from facert.models.factors import model
-from facert.models.factors.censoring import Limits
-from facert.models.factors.model import Evidence, Factors, learn_factors
+from facert.models.factors import factor_analysis
+from facert.models.factors.censoring import CensoringLimits
+from facert.models.factors.factor_analysis import FactorData, FactorModel, learn_factors
 from facert.settings import Settings
 
 
-def ridge_weights(evidence):
+def ridge_weights(data):
     """The slopes of a ridge regression on the pairs alone, (d_x, d_y)."""
-    return Ridge(Settings(method="ridge"))._regress(evidence.X, evidence.Y)[0].weights
+    return Ridge(Settings(method="ridge"))._regress(data.X, data.Y)[0].weights
 
 
 class Truth:
@@ -31,7 +31,7 @@ class Truth:
         self.noise = noise
 
     def regression(self):
-        """What a frame says of its pose at best, (d_x, d_y)."""
+        """The best prediction of poses from frames, (d_x, d_y)."""
         covariance = self.Wx @ self.Wx.T + self.noise**2 * np.eye(len(self.Wx))
         return np.linalg.solve(covariance, self.Wx @ self.Wy.T)
 
@@ -41,32 +41,32 @@ class Truth:
         X, Y = Z @ self.Wx.T, Z @ self.Wy.T
         return (view + self.noise * self.rng.normal(size=view.shape) for view in (X, Y))
 
-    def evidence(self, labels=6, frames=600, poses=300, limits=None):
+    def data(self, labels=6, frames=600, poses=300, limits=None):
         (X, Y), (alone, _), (_, animation) = map(self.draw, (labels, frames, poses))
         d_y = Y.shape[1]
-        limits = limits or Limits(np.full(d_y, -np.inf), np.full(d_y, np.inf))
+        limits = limits or CensoringLimits(np.full(d_y, -np.inf), np.full(d_y, np.inf))
         low_high = limits.low, limits.high
-        return Evidence(X, np.clip(Y, *low_high), alone, np.clip(animation, *low_high), limits)
+        return FactorData(X, np.clip(Y, *low_high), alone, np.clip(animation, *low_high), limits)
 
 
-def ridge_guess(evidence):
-    return evidence.frames @ ridge_weights(evidence)
+def ridge_guess(data):
+    return data.frames @ ridge_weights(data)
 
 
-def log_likelihood(factors: Factors, evidence: Evidence) -> float:
+def log_likelihood(factors: FactorModel, data: FactorData) -> float:
     """Of pairs, frames and poses under the marginal Gaussian distributions of the model."""
     d_x = len(factors.Wx)
     W = np.vstack([factors.Wx, factors.Wy])
     noise = np.concatenate([np.full(d_x, factors.noise_x), factors.noise_y])
     joint = W @ W.T + np.diag(noise)
     mean = np.concatenate([np.zeros(d_x), factors.mean])
-    pairs = np.hstack([evidence.X, evidence.Y])
+    pairs = np.hstack([data.X, data.Y])
     return sum(
         multivariate_normal(mean[view], joint[view, view]).logpdf(rows).sum()
         for rows, view in (
             (pairs, slice(None)),
-            (evidence.frames, slice(None, d_x)),
-            (evidence.poses, slice(d_x, None)),
+            (data.frames, slice(None, d_x)),
+            (data.poses, slice(d_x, None)),
         )
     )
 
@@ -75,20 +75,20 @@ def log_likelihood(factors: Factors, evidence: Evidence) -> float:
 def nothing_but_likelihood(monkeypatch):
     """Neither priors nor floors."""
     for name in ("PRIOR_POSES", "PRIOR_SHARE"):
-        monkeypatch.setattr(model, name, 0.0)
+        monkeypatch.setattr(factor_analysis, name, 0.0)
     for name in ("SOURCE_FLOOR", "TARGET_FLOOR"):
-        monkeypatch.setattr(model, name, 1e-6)
+        monkeypatch.setattr(factor_analysis, name, 1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_step_lowers_the_likelihood(nothing_but_likelihood, seed):
-    evidence = Truth(d_x=8, d_y=5, q=3, noise=0.3, seed=seed).evidence(12, 40, 25)
-    guess = 0.5 * ridge_guess(evidence)
-    search = model._Search(evidence, model._principal_factors(evidence, guess))
-    curve = [log_likelihood(search.factors, evidence)]
+    data = Truth(d_x=8, d_y=5, q=3, noise=0.3, seed=seed).data(12, 40, 25)
+    guess = 0.5 * ridge_guess(data)
+    search = factor_analysis._Search(data, factor_analysis._principal_factors(data, guess))
+    curve = [log_likelihood(search.factors, data)]
     for _ in range(25):
         search.step()
-        curve.append(log_likelihood(search.factors, evidence))
+        curve.append(log_likelihood(search.factors, data))
 
     assert (np.diff(curve) > -1e-8 * np.abs(curve[0])).all()
     assert curve[-1] > curve[0] + 1.0
@@ -96,17 +96,16 @@ def test_no_step_lowers_the_likelihood(nothing_but_likelihood, seed):
 
 def test_where_the_search_stays_the_likelihood_is_flat(nothing_but_likelihood, monkeypatch):
     """All parameters have derivative zero where the steps end."""
-    monkeypatch.setattr(model, "ITERATIONS", 3000)
-    monkeypatch.setattr(model, "FACTORS", 2)
-    evidence = Truth(d_x=4, d_y=3, q=2, noise=0.4).evidence(15, 30, 20)
-    found = learn_factors(evidence, ridge_guess(evidence))
+    monkeypatch.setattr(factor_analysis, "ITERATIONS", 3000)
+    monkeypatch.setattr(factor_analysis, "FACTORS", 2)
+    data = Truth(d_x=4, d_y=3, q=2, noise=0.4).data(15, 30, 20)
+    found = learn_factors(data, ridge_guess(data))
     rng = np.random.default_rng(0)
     for name in ("Wx", "Wy", "mean", "noise_y", "noise_x"):
         value = getattr(found, name)
         step = 1e-5 * rng.normal(size=np.shape(value))
         up, down = (
-            log_likelihood(replace(found, **{name: value + sign * step}), evidence)
-            for sign in (1, -1)
+            log_likelihood(replace(found, **{name: value + sign * step}), data) for sign in (1, -1)
         )
         assert abs(up - down) / 2e-5 < 0.02
 
@@ -114,30 +113,30 @@ def test_where_the_search_stays_the_likelihood_is_flat(nothing_but_likelihood, m
 @pytest.mark.parametrize("seed", range(3))
 def test_unlabelled_data_tells_a_linear_map_from_few_labels_far_better_than_ridge(seed):
     truth = Truth(d_x=60, d_y=30, noise=0.3, seed=seed)
-    evidence = truth.evidence(labels=10, frames=2000, poses=1000)
+    data = truth.data(labels=10, frames=2000, poses=1000)
     X, _ = truth.draw(500)
     best = X @ truth.regression()
-    found, _ = learn_factors(evidence, ridge_guess(evidence)).regression()
-    ridge = ridge_weights(evidence)
+    found, _ = learn_factors(data, ridge_guess(data)).regression()
+    ridge = ridge_weights(data)
 
     assert rms(X @ found - best) < 0.5 * rms(X @ ridge - best)
 
 
 def test_the_std_of_a_pose_is_that_of_its_errors():
     truth = Truth(d_x=60, d_y=30, noise=0.3)
-    evidence = truth.evidence(labels=20, frames=2000, poses=1000)
+    data = truth.data(labels=20, frames=2000, poses=1000)
     X, Y = truth.draw(2000)
-    found = learn_factors(evidence, ridge_guess(evidence))
+    found = learn_factors(data, ridge_guess(data))
     B, std = found.regression()
     np.testing.assert_allclose((Y - found.mean - X @ B).std(axis=0), std, rtol=0.2)
 
 
 def test_turning_the_source_turns_its_weights_and_changes_no_pose():
-    evidence = Truth().evidence()
-    guess = ridge_guess(evidence)
+    data = Truth().data()
+    guess = ridge_guess(data)
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(24, 24)))
-    turned = replace(evidence, X=evidence.X @ turn, frames=evidence.frames @ turn)
-    B, std = learn_factors(evidence, guess).regression()
+    turned = replace(data, X=data.X @ turn, frames=data.frames @ turn)
+    B, std = learn_factors(data, guess).regression()
     B_turned, std_turned = learn_factors(turned, guess).regression()
 
     np.testing.assert_allclose(B_turned, turn.T @ B, atol=1e-8)
@@ -147,17 +146,17 @@ def test_turning_the_source_turns_its_weights_and_changes_no_pose():
 def test_permuting_rows_changes_nothing_and_permuting_controls_permutes_the_map():
     truth = Truth()
     zero = np.zeros(10)
-    evidence = truth.evidence(limits=Limits(zero, zero + np.inf))
-    guess, rng = ridge_guess(evidence), np.random.default_rng(1)
+    data = truth.data(limits=CensoringLimits(zero, zero + np.inf))
+    guess, rng = ridge_guess(data), np.random.default_rng(1)
     labels, frames, poses, controls = map(rng.permutation, (6, 600, 300, 10))
     permuted = replace(
-        evidence,
-        X=evidence.X[labels],
-        Y=evidence.Y[np.ix_(labels, controls)],
-        frames=evidence.frames[frames],
-        poses=evidence.poses[np.ix_(poses, controls)],
+        data,
+        X=data.X[labels],
+        Y=data.Y[np.ix_(labels, controls)],
+        frames=data.frames[frames],
+        poses=data.poses[np.ix_(poses, controls)],
     )
-    B, std = learn_factors(evidence, guess).regression()
+    B, std = learn_factors(data, guess).regression()
     found = learn_factors(permuted, guess[np.ix_(frames, controls)]).regression()
 
     np.testing.assert_allclose(found[0], B[:, controls], atol=1e-7)
@@ -165,43 +164,41 @@ def test_permuting_rows_changes_nothing_and_permuting_controls_permutes_the_map(
 
 
 def test_of_frames_without_a_pose_only_the_second_moments_matter():
-    evidence = Truth().evidence(frames=60)
-    guess = ridge_guess(evidence)
+    data = Truth().data(frames=60)
+    guess = ridge_guess(data)
     mix, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(60, 60)))
-    B, _ = learn_factors(evidence, guess).regression()
-    mixed, _ = learn_factors(
-        replace(evidence, frames=mix @ evidence.frames), mix @ guess
-    ).regression()
+    B, _ = learn_factors(data, guess).regression()
+    mixed, _ = learn_factors(replace(data, frames=mix @ data.frames), mix @ guess).regression()
     np.testing.assert_allclose(mixed, B, atol=1e-8)
 
 
 def test_knowing_of_limits_a_map_bent_by_them_is_found_straight():
     truth = Truth(noise=0.05, d_y=6)
     zero = np.zeros(6)
-    evidence = truth.evidence(labels=40, limits=Limits(zero, zero + np.inf))
-    unaware = replace(evidence, limits=Limits(zero - np.inf, zero + np.inf))
+    data = truth.data(labels=40, limits=CensoringLimits(zero, zero + np.inf))
+    unaware = replace(data, limits=CensoringLimits(zero - np.inf, zero + np.inf))
     X, free = truth.draw(500)
 
-    def error(evidence):
-        found = learn_factors(evidence, ridge_guess(evidence))
+    def error(data):
+        found = learn_factors(data, ridge_guess(data))
         return rms(found.mean + X @ found.regression()[0] - free)
 
-    assert error(evidence) < 0.5 * error(unaware)
+    assert error(data) < 0.5 * error(unaware)
 
 
 @pytest.mark.parametrize(("frames", "poses"), [(0, 0), (0, 50), (50, 0)])
 def test_either_kind_of_unlabelled_data_may_be_absent(frames, poses):
     truth = Truth(d_x=8, d_y=4, q=2)
-    evidence = truth.evidence(12, frames, poses)
+    data = truth.data(12, frames, poses)
     X, Y = truth.draw(200)
-    B, std = learn_factors(evidence, ridge_guess(evidence)).regression()
+    B, std = learn_factors(data, ridge_guess(data)).regression()
     assert rms(X @ B - Y) < 0.6 * Y.std()
     assert np.isfinite(std).all()
 
 
 def test_three_frames_of_one_dimension_suffice():
-    evidence = Truth(d_x=1, d_y=1, q=1).evidence(3, 0, 0)
-    B, std = learn_factors(evidence, np.empty((0, 1))).regression()
+    data = Truth(d_x=1, d_y=1, q=1).data(3, 0, 0)
+    B, std = learn_factors(data, np.empty((0, 1))).regression()
     assert B.shape == (1, 1)
     assert np.isfinite(B).all()
     assert (std > 0).all()

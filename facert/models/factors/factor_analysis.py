@@ -8,9 +8,9 @@ seeks the latent coordinates, this one integrates the latent coordinates out and
 so that a frame without a pose costs no unknowns. It is factor analysis of two views (Bach and
 Jordan 2005), of which most frames and most poses show one.
 
-What it draws from unlabelled data is strong. Frames alone give the covariance W_x W_xᵀ + σ² I, and
+It draws much from unlabelled data. Frames alone give the covariance W_x W_xᵀ + σ² I, and
 poses alone W_y W_yᵀ + Ψ: each fixes its weights but for a rotation of the factors, and the labels
-are left with that rotation alone to tell. Clipping is that of `facert.models.factors.censoring`.
+are left with that rotation alone to find. Clipping: see `facert.models.factors.censoring`.
 
 The expectation-maximisation algorithm finds the weights. Given z, the views are independent, so
 that with P_x = W_xᵀ W_x/σ² and P_y = W_yᵀ Ψ⁻¹ W_y the posterior of z has the covariance
@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.models.factors.censoring import CensoredPoses, Limits
+from facert.models.factors.censoring import CensoredPoses, CensoringLimits
 
 FACTORS = 24  # at most
 ITERATIONS = 100
@@ -45,8 +45,8 @@ PRIOR_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """What the factors are learned from; both views with mean zero.
+class FactorData:
+    """Pairs, frames and poses to learn factors from; both views with mean zero.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Evidence:
         Frames without a pose.
     poses : array, shape (n, d_y)
         Poses without a frame.
-    limits : Limits
+    limits : CensoringLimits
         Of the poses.
     """
 
@@ -64,11 +64,11 @@ class Evidence:
     Y: FloatArray
     frames: FloatArray
     poses: FloatArray
-    limits: Limits
+    limits: CensoringLimits
 
 
 @dataclass(frozen=True, eq=False)
-class Factors:
+class FactorModel:
     """The weights of both views and their noise.
 
     Parameters
@@ -103,7 +103,7 @@ class Factors:
         return ((Y - self.mean) / self.noise_y) @ self.Wy
 
     def regression(self) -> tuple[FloatArray, FloatArray]:
-        """What a frame says about its free pose: y* = μ + x B, std s.
+        """The free pose given its frame: y* = μ + x B, with standard deviation s.
 
         Returns
         -------
@@ -116,35 +116,35 @@ class Factors:
 
 
 def covariance(P: FloatArray) -> FloatArray:
-    """(I + P)⁻¹, of factors with the precision P from what was seen."""
+    """(I + P)⁻¹, the covariance of factors with the precision P from the views seen."""
     return np.asarray(np.linalg.inv(np.eye(len(P)) + P), dtype=np.float64)
 
 
-def learn_factors(evidence: Evidence, guess: FloatArray) -> Factors:
+def learn_factors(data: FactorData, guess: FloatArray) -> FactorModel:
     """The factors behind both views.
 
     Parameters
     ----------
-    evidence : Evidence
+    data : FactorData
     guess : array, shape (m, d_y)
         Poses that another method predicts for the frames without one. The search begins at, and
         its prior is around, the principal components of frames joined with poses.
     """
-    search = _Search(evidence, _principal_factors(evidence, guess))
+    search = _Search(data, _principal_factors(data, guess))
     for _ in range(ITERATIONS):
         search.step()
     return search.factors
 
 
-def _principal_factors(evidence: Evidence, guess: FloatArray) -> Factors:
-    joined = np.vstack([np.hstack([evidence.X, evidence.Y]), np.hstack([evidence.frames, guess])])
-    d_x = evidence.X.shape[1]
+def _principal_factors(data: FactorData, guess: FloatArray) -> FactorModel:
+    joined = np.vstack([np.hstack([data.X, data.Y]), np.hstack([data.frames, guess])])
+    d_x = data.X.shape[1]
     variances, directions = np.linalg.eigh(joined.T @ joined / len(joined))
     q = min(FACTORS, len(joined) - 1, joined.shape[1] - 1)
     W = directions[:, -q:] * np.sqrt(np.maximum(variances[-q:], 0.0))
     rest = float(np.maximum(variances[:-q], 0.0).sum()) / d_x
     d_y = len(W) - d_x
-    return Factors(
+    return FactorModel(
         W[:d_x], W[d_x:], np.zeros(d_y), max(rest, SOURCE_FLOOR), np.full(d_y, TARGET_FLOOR)
     )
 
@@ -152,13 +152,13 @@ def _principal_factors(evidence: Evidence, guess: FloatArray) -> Factors:
 class _Search:
     """Steps of the expectation-maximisation algorithm."""
 
-    def __init__(self, evidence: Evidence, start: Factors) -> None:
+    def __init__(self, data: FactorData, start: FactorModel) -> None:
         self.factors, self.start = start, start
-        self.X, self.Y, self.poses = evidence.X, evidence.Y, evidence.poses
-        self.paired = CensoredPoses.of(evidence.Y, evidence.limits)
-        self.alone = CensoredPoses.of(evidence.poses, evidence.limits)
-        self.count = len(evidence.frames)
-        self.moments = evidence.frames.T @ evidence.frames
+        self.X, self.Y, self.poses = data.X, data.Y, data.poses
+        self.paired = CensoredPoses.of(data.Y, data.limits)
+        self.alone = CensoredPoses.of(data.poses, data.limits)
+        self.count = len(data.frames)
+        self.moments = data.frames.T @ data.frames
 
     def step(self) -> None:
         """Expect the factors of every row and the free poses, then find the weights."""
@@ -190,7 +190,7 @@ class _Search:
         )
         noise_x = rest_x.sum() / ((len(X) + count) * len(rest_x))
         noise_y = (rest_y + PRIOR_POSES * rest_y.mean() / n) / (n + PRIOR_POSES)
-        self.factors = Factors(
+        self.factors = FactorModel(
             Wx,
             Wy,
             mean,
@@ -201,17 +201,18 @@ class _Search:
     def _free_poses(self, Z: FloatArray, Z_alone: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Expect the free poses; their mean beside the factors, and their summed variances."""
         now, std = self.factors, np.sqrt(self.factors.noise_y)
-        said, said_alone = Z @ now.Wy.T, Z_alone @ now.Wy.T
-        self.Y, spread = self.paired.free(now.mean + said, std)
-        self.poses, spread_alone = self.alone.free(now.mean + said_alone, std)
-        total = np.sum(self.Y - said, axis=0) + np.sum(self.poses - said_alone, axis=0)
+        predicted, predicted_alone = Z @ now.Wy.T, Z_alone @ now.Wy.T
+        self.Y, spread = self.paired.free(now.mean + predicted, std)
+        self.poses, spread_alone = self.alone.free(now.mean + predicted_alone, std)
+        total = np.sum(self.Y - predicted, axis=0)
+        total += np.sum(self.poses - predicted_alone, axis=0)
         return total / (len(Z) + len(Z_alone)), spread + spread_alone
 
 
 def _regress(
     products: FloatArray, squares: FloatArray, totals: FloatArray, prior: FloatArray, rows: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Weights W of a view, (d, q), and what they leave of its squares, (d,).
+    """Weights W of a view, (d, q), and the residual sum of its squares, (d,).
 
     Parameters
     ----------

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from facert.models.gplvm.alignment import align, principal_components
+from facert.models.gplvm.initial_latents import align, principal_components
 from facert.models.gplvm.lle import constraint_matrix
 
 LABELLED = 12

@@ -1,4 +1,4 @@
-"""The training loop: advance, watch, checkpoint, until the objective no longer falls."""
+"""The training loop: iterate and keep checkpoints until the objective no longer falls."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from facert.errors import InputError, NumericalError
 from facert.models.gplvm.module import SharedGPLVM
-from facert.models.optim.base import Optimiser, Result, State, Status
 from facert.models.optim.flat import FlatObjective
 from facert.models.optim.monitor import Monitor, Progress
+from facert.models.optim.optimiser import Optimiser, Result, State, Status
 
 
 def train(
@@ -40,7 +40,7 @@ def train(
     fingerprint : str
         Identifies the problem: its data and its settings.
     monitor : Monitor
-        Watches, keeps checkpoints, knows where an earlier run stopped.
+        Sees every iteration, keeps checkpoints, and has that of an earlier run.
     magnitude : float
         The decrease is taken relative to this at least: an objective that passes through zero is
         no measure of itself.

@@ -1,4 +1,4 @@
-"""What an optimiser is: a state that can be saved, and a way to advance it."""
+"""The interface of an optimiser: a state that can be saved, and a way to advance it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class State:
     iterations : int
         Iterations so far.
     memory : mapping of str to array
-        What the optimiser needs besides x to go on exactly as if it had not stopped.
+        Whatever else the optimiser goes on from, exactly as if it had not stopped.
     stalled : bool
         No further descent is possible from here.
     """
