@@ -66,7 +66,7 @@ def words(name: str) -> tuple[str, ...]:
 
 
 def folded(name: str) -> str:
-    """What all spellings of a name have in common: its words, with a mark between two numbers.
+    """The form that all spellings of a name share: its words, with a mark between two numbers.
 
     >>> folded("EyeBlink_L"), folded("eye-blink-left"), folded("m1.12"), folded("m11.2")
     ('eyeblinkleft', 'eyeblinkleft', 'm1_12', 'm11_2')
@@ -151,7 +151,7 @@ def fitting(pattern: str, names: Sequence[str]) -> list[int]:
 
 
 def instead_of(name: str, among: Sequence[str]) -> str | None:
-    """What a person may have meant by a name that is not there, for a message.
+    """The names that a person may have meant by one that is not there, for a message.
 
     >>> instead_of("smile", ["smile_L", "smile_R"]), instead_of("smille_L", ["smile_L", "smile_R"])
     ("'smile*' for both sides", "'smile_L'")

@@ -29,7 +29,7 @@ class Normalisation:
 
     @classmethod
     def of(cls, values: FloatArray, field: str) -> Normalisation:
-        """From rows (n, d); NaN is passed over.
+        """The normalisation of rows (n, d); NaN is passed over.
 
         Raises `InputError` when nothing varies.
         """
@@ -48,9 +48,9 @@ class Normalisation:
         return Normalisation(other.apply(self.mean), self.scale / other.scale)
 
     def apply(self, values: FloatArray) -> FloatArray:
-        """To normalised units, (n, d)."""
+        """Values (n, d) in normalised units."""
         return (values - self.mean) / self.scale
 
     def undo(self, values: FloatArray) -> FloatArray:
-        """Back to the data's units, (n, d)."""
+        """Values (n, d) back in the data's units."""
         return values * self.scale + self.mean

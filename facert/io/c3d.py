@@ -51,7 +51,7 @@ def read_c3d(path: Path) -> Take:
 
 @contextmanager
 def _parsing() -> Iterator[None]:
-    """Blame the file for whatever goes wrong in the block, warnings of the package aside."""
+    """An error about the file for whatever the package raises; its warnings are passed over."""
     quiet = warnings.catch_warnings()
     with parsing("file", "a whole C3D file"), np.errstate(all="ignore"), quiet:
         warnings.simplefilter("ignore")

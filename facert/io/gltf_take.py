@@ -97,7 +97,7 @@ def _curves(document: Document, animation: dict[str, Any], channel: dict[str, An
 
 
 def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:
-    """When there are frames, and their rate: at every key, and evenly between keys far apart."""
+    """Times of the frames, and their rate: at every key, and evenly between keys far apart."""
     time = np.unique(np.concatenate(keys))
     if len(time) < 2:
         return time, nominal_rate(time)

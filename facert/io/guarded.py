@@ -51,7 +51,7 @@ def read_text(path: Path) -> str:
 def parsing(
     field: str, expected: str, fix: str = "Export it again.", found: str = "damaged data"
 ) -> Iterator[None]:
-    """Blame a file for whatever goes wrong in the block, where its bytes are given a meaning.
+    """An error about the file for whatever goes wrong in the block, where its bytes get a meaning.
 
     Hostile bytes raise struct.error, KeyError, OverflowError and more, which nobody can list.
 

@@ -99,7 +99,7 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
 
 
 def _ticks_and_columns(take: Take) -> tuple[IntArray, FloatArray]:
-    """What to write: the time since midnight, and the numbers (T, 61)."""
+    """The ticks since midnight (T,), and the numbers to write (T, 61)."""
     columns = _arkit_columns(take)
     known = np.asarray(~np.isnan(columns).all(axis=1))
     if np.isnan(columns[known]).any():
@@ -205,7 +205,7 @@ def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:
 
 
 def _arkit_columns(take: Take) -> FloatArray:
-    """What to write, (T, 61): the poses, else the source weights, in the order of the CSV."""
+    """The poses, else the source weights, in the order of the CSV, (T, 61)."""
     names, values = named_curves(take)
     field = "/source/names" if take.params is None else "/target/names"
     foreign = [name for name in names if canonical(name) not in ARKIT_NAMES]

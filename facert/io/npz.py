@@ -94,7 +94,7 @@ class Archive:
 
 
 def _parsing(key: str) -> AbstractContextManager[None]:
-    """Blame the file: NumPy evaluates a header as Python source, and trusts its numbers."""
+    """An error about the file: NumPy evaluates a header as Python source, trusting its numbers."""
     found = "damaged data, or less than the array declares"
     return parsing(key, "a whole array", "Store it anew.", found)
 

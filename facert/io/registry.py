@@ -61,7 +61,7 @@ FORMATS = (
         writes="take, rig or mesh sequence",
     ),
     Format(
-        (".livelink.csv",),
+        (".livelink.csv",),  # read as .csv: the header decides
         write={"take": "livelink.write_livelink"},
         reads="Live Link Face",
         writes="poses (else source weights), if they are ARKit's",

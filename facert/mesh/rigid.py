@@ -41,11 +41,11 @@ class RigidMotion:
         return RigidMotion(back, -np.einsum("tij,tj->ti", back, self.translations))
 
     def at(self, frame: int) -> RigidMotion:
-        """One frame of it."""
+        """The motion of one frame."""
         return RigidMotion(self.rotations[[frame]], self.translations[[frame]])
 
     def interpolated(self, time: FloatArray, known: BoolArray) -> RigidMotion:
-        """The same in known frames; between them along the shortest way, held at both ends."""
+        """The motion of all frames: between known ones the shortest way, held at both ends."""
         if known.all():
             return self
         if known.sum() == 1:
