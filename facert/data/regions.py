@@ -59,7 +59,7 @@ class Regions:
 
     @classmethod
     def of(cls, tables: Mapping[str, Any]) -> Regions:
-        """Regions from a table each, as in a TOML file: ``{"brows": {"markers": [], "controls": []}}``.
+        """Regions from tables as in a TOML file: ``{"brows": {"markers": [], "controls": []}}``.
 
         Raises `InputError` for anything else.
         """

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from facert.data.take import Take
 from facert.errors import InputError
+from facert.io.registry import OWN_ENDINGS
 from facert.live.frames import Counters, Decoder, Encoder
 from facert.live.ifacialmocap import IFacialMocapDecoder
 from facert.live.livelink_packets import LiveLinkDecoder, LiveLinkEncoder
@@ -19,7 +20,7 @@ from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 LOOPBACK = "127.0.0.1"
 IN_FILES: Mapping[str, tuple[str, ...]] = {"take": ()}
-OUT_FILES: Mapping[str, tuple[str, ...]] = {"csv": (".csv",), "h5": (".h5", ".hdf5")}
+OUT_FILES: Mapping[str, tuple[str, ...]] = {"csv": (".csv",), "h5": OWN_ENDINGS}
 
 
 @dataclass(frozen=True)
