@@ -18,17 +18,15 @@ def scaled_source(take: KeyedPerformance) -> FloatArray:
     The rotation R and s ≥ 0 are best over all feature points and keys (Kabsch 1976, Umeyama 1991):
     it does not matter which way is up in either.
     """
-    source, target = (motion.reshape(-1, 3) for motion in _centred_keys(take))
-    power = float(np.sum(source**2))
-    if power == 0:
-        return np.zeros_like(take.source)
-    target_size = float(np.linalg.norm(target)) or 1.0
-    target, weights = np.sqrt(power) / target_size * target, np.ones((1, len(source)))
-    # From the best rotation but for the pull, the pull bends nothing that the motion determines.
+    motions = [motion.reshape(-1, 3) for motion in _centred_keys(take)]
+    sizes = [float(np.linalg.norm(motion)) or 1.0 for motion in motions]
+    source, target = (motion / size for motion, size in zip(motions, sizes, strict=True))
+    weights = np.ones((1, len(source)))
     first = align(source, target[None], weights, PULL)
+    # Begun at the first rotation, the pull bends nothing that the motion determines.
     motion = align(first.apply(source)[0], target[None], weights, PULL).after(first)
     rotation = motion.rotations[0].T
-    scale = target_size / np.sqrt(power) * float(np.sum((source @ rotation) * target)) / power
+    scale = sizes[1] / sizes[0] * float(np.sum((source @ rotation) * target))
     return np.asarray(scale * take.source @ rotation)
 
 

@@ -1,7 +1,7 @@
 """Labels: the points whose target is given, and whether they suffice.
 
-B knows nothing of where a connected component lies: the constant over it costs nothing, so that a
-label at least must hold it. With tangent spaces as large as space itself (d = D), any affine map
+B does not depend on where a connected component lies: the constant over it costs nothing, so that
+a label at least must hold it. With tangent spaces as large as space itself (d = D), any affine map
 of the component costs nothing, and D + 1 labels must hold it.
 """
 

@@ -1,6 +1,6 @@
 """Feature points that serve driving best: where a rig's shapes are hardest to predict.
 
-First some points on the rim, far from each other, since without them no method knows where the face
+First some points on the rim, far from each other, since without them no method sees where the face
 ends. Then, one after the other, the vertex that the framework misses most over all shapes of the
 rig, predicted from the points so far. Lips, lids and brows come by themselves: they move most, and
 unlike what is around them.

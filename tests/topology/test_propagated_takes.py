@@ -43,7 +43,7 @@ def test_poses_stay_within_declared_limits(take):
     assert np.abs(result.params).max() == pytest.approx(0.05)
 
 
-def test_poses_stay_within_what_is_known_unless_told(take):
+def test_poses_stay_within_what_is_known_unless_limits_are_given(take):
     keys = [10, 25, 40, 55]
     free = propagate_poses(take, keys, Propagation(limits="none")).params
     low, high = take.params[keys].min(axis=0), take.params[keys].max(axis=0)
@@ -53,7 +53,7 @@ def test_poses_stay_within_what_is_known_unless_told(take):
     np.testing.assert_array_equal(declared.params, free)  # none are
 
 
-def test_old_animation_tells_the_range_too(take):
+def test_old_animation_counts_for_the_range_too(take):
     keys = [10, 25, 40, 55]
     animation = np.vstack([take.params[keys], [[-9.0] * 4, [9.0] * 4]])
     free = propagate_poses(take, keys, Propagation(limits="none"))

@@ -111,7 +111,7 @@ def test_the_source_is_turned_and_scaled_onto_a_similar_target(scale, seed):
     np.testing.assert_allclose(scaled_source(similar), truth, atol=1e-9 * scale)
 
 
-def test_a_key_that_is_left_out_is_missed_by_as_much_as_is_said():
+def test_leave_one_out_errors_are_those_of_leaving_each_key_out():
     """The closed form of the leave-one-out error, against leaving each key out."""
     rng = np.random.default_rng(0)
     X, Y = rng.normal(size=(8, 5)), rng.normal(size=(8, 2))

@@ -39,7 +39,7 @@ def test_the_path_is_a_spline_at_rest_before_the_first_key_and_after_the_last():
     np.testing.assert_allclose(found[56:], given_there[[3, 3, 3, 3]], atol=1e-12)
 
 
-def test_the_stiffness_tells_how_much_the_path_is_bent():
+def test_the_stiffness_is_how_much_the_path_is_bent():
     path, given_there = SmoothPath(60, KEYS), values(1)
     order = np.argsort(KEYS)
     bent = CubicSpline(KEYS[order], given_there[order, 0], bc_type="clamped").derivative(2)
