@@ -1,4 +1,4 @@
-"""Known poses of a character, which tell what poses it makes; and what of a pose is given."""
+"""Known poses of a character, from which others are predicted; and given controls of a pose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.take import Take
 from facert.settings import LimitRule
 
-# Beyond, more poses tell little, and a new set of given controls takes longer to learn.
+# Beyond, more poses help little, and a new set of given controls takes longer to learn.
 MOST = 500
 
 

@@ -21,7 +21,7 @@ ENTRIES = ("gain", "limits", "smoothing")
 
 @dataclass(frozen=True, eq=False)
 class Adjustments:
-    """For every control of a character.
+    """Gain, limits and smoothing of every control of a character.
 
     Parameters
     ----------
@@ -39,18 +39,18 @@ class Adjustments:
 
     @classmethod
     def none(cls, controls: int) -> Adjustments:
-        """That change nothing."""
+        """Adjustments that change nothing."""
         return cls(np.ones(controls), np.tile([-np.inf, np.inf], (controls, 1)), np.ones(controls))
 
     @classmethod
     def of(cls, tables: Mapping[str, Any], names: Sequence[str]) -> Adjustments:
-        """From a table for each control, as in a TOML file.
+        """Adjustments from a table for each control, as in a TOML file.
 
         Parameters
         ----------
         tables : mapping
             ``{"jawOpen": {"gain": 1.1, "limits": [0.0, 0.9], "smoothing": 0.5}}``; a name may
-            have wildcards, ``"eyeBlink*"``. What a later table says of a control holds.
+            have wildcards, ``"eyeBlink*"``. A later table overrides an earlier one.
         names : sequence of str
             Of the character's controls.
 
@@ -82,7 +82,7 @@ class Adjustments:
         return bool((self.smoothing == 1.0).all())
 
     def mixed(self, smooth: FloatArray, rough: FloatArray) -> FloatArray:
-        """What follows the cleaned source and what follows the measured one, (T, P) each."""
+        """Poses between those of the cleaned and of the measured source, (T, P) each."""
         return np.asarray(self.smoothing * smooth + (1.0 - self.smoothing) * rough)
 
 
@@ -100,7 +100,7 @@ class RetargetOptions(SourceOptions):
 
 
 AS_IT_IS = RetargetOptions(detect=False, smooth=False)
-"""Every frame on its own, and every number believed."""
+"""Every frame on its own, as it was measured."""
 
 
 class PoseScale:

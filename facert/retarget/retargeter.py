@@ -24,7 +24,7 @@ from facert.preprocess.motion.estimate import FEWEST
 from facert.preprocess.motion.series import even_grid
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
-from facert.retarget.novelty import WORTH_TELLING, Novelty, Shown
+from facert.retarget.novelty import novelty_warning, relative_residuals, usual_variance
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
 from facert.retarget.stream import RetargetStream
 
@@ -144,10 +144,12 @@ class Retargeter(TrainedModel):
         """Warn of cleaned, normalised frames (T, d_x) that are like no posed one."""
         if self.labelled is None or not len(self.labelled):
             return
-        shown = Shown.by(self.source_units.apply(self.labelled), self.motion)
-        novelty = Novelty.of(shown.left(frames, self.layout.kind), self.layout.names)
-        if novelty.share >= WORTH_TELLING:
-            log.warning("%s", novelty)
+        posed = self.source_units.apply(self.labelled)
+        variance = usual_variance(posed, self.motion)
+        found = relative_residuals(frames, posed, variance, self.layout.kind)
+        warning = novelty_warning(found, self.layout.names)
+        if warning is not None:
+            log.warning("%s", warning)
 
     def _performance(
         self, take: Take, source: Source, params: FloatArray, std: FloatArray | None

@@ -102,11 +102,11 @@ def test_regions_begin_each_at_their_own(make_take):
     )
     settings = replace(SHARED, unlabelled=20, latent_dim=2, max_iterations=60, regions=regions)
     first = facert.train(take, settings)
-    told = []
+    moved = []
     again = facert.train(take, replace(first.settings, max_iterations=1), start=first)
     for old, new in zip(first.method.parts_, again.method.parts_, strict=True):
-        told.append(np.abs(new.method.source_.Z - old.method.source_.Z).max())
-    assert max(told) < 0.1  # one iteration from where they were; alignment would be elsewhere
+        moved.append(np.abs(new.method.source_.Z - old.method.source_.Z).max())
+    assert max(moved) < 0.1  # one iteration from where they were; alignment would be elsewhere
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ RISE, FALL, MOST = 4.0, 0.8, 1e6
 """How much wider in a frame what is left over may be taken to vary, how much narrower, and how much
 wider at all than in training."""
 FAR, GROSS = 6.0, 1.0
-"""A number so many standard deviations off, and so many normalised units, is not believed for a
+"""A number so many standard deviations off, and so many normalised units, is ignored for a
 frame: nothing moves so far so quickly, but bad markers do."""
 NOISE_FRAMES = 120
 """Frames that noise is estimated from."""
