@@ -96,7 +96,7 @@ class PosePage(PlayedPage):
             self.slow.do("suggest", self._suggest)
 
     def _change(self, key: object, change: Callable[[], None]) -> None:
-        """Do something to the pose and show it."""
+        """Change the pose in the worker, and show it."""
 
         def task() -> None:
             change()
@@ -154,7 +154,7 @@ class PosePage(PlayedPage):
         self.suggest()
 
     def _train(self) -> None:
-        """In the slow worker."""
+        """Train, in the slow worker, and hand the outcome to the other."""
         try:
             trained = self.session.train()
         finally:
@@ -173,7 +173,7 @@ class PosePage(PlayedPage):
         self._write(self._news, learned + moved + where)
 
     def _suggest(self) -> None:
-        """In the slow worker."""
+        """Find the frames to pose next, in the slow worker."""
         try:
             found = self.session.suggestion(SUGGESTED)
         except InputError as error:  # nearly all frames are posed
@@ -253,7 +253,7 @@ class PosePage(PlayedPage):
 
 
 class _PoseStage:
-    """The actor in a frame, the character as it is posed, and samples when they are asked for.
+    """The stage of the page: the actor in a frame, the posed character, and other poses.
 
     Raises
     ------

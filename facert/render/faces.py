@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import shape_drivers
+from facert.data.names import NameIndex, shape_drivers
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Take
 from facert.errors import InputError
@@ -77,7 +77,8 @@ def actor_face(take: Take, rig: Rig) -> Face:
     InputError
         When the rig has a shape for none of the weights, see `facert.data.names.shape_drivers`.
     """
-    known = [name for name in take.source.names if drives(rig, [name])]
+    index = NameIndex(rig.names)
+    known = [name for name in take.source.names if index.find_halves(name)]
     if not known:
         raise _misfit("shapes for the take's weights", f"none for {take.source.names[0]!r}")
     columns = [take.source.names.index(name) for name in known]
