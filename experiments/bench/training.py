@@ -15,7 +15,7 @@ from experiments.bench.problem import bench_data
 from facert import Settings
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
-from facert.methods.base import Labelled, Report, WarmStart
+from facert.methods.base import Labelled, TrainingReport, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import make_method
 from facert.methods.shared_gplvm import SemiSupervisedSGPLVM
@@ -67,7 +67,7 @@ def another_label(settings: Settings) -> Call:
     before.fit(Labelled(labelled.X[:-1], labelled.Y[:-1]), unlabelled)
     same = [Normalisation(np.zeros(width), 1.0) for width in before.dimensions]
 
-    def call() -> Report:
+    def call() -> TrainingReport:
         method = make_method(before.settings)
         assert isinstance(method, WarmStart)
         method.begin_at(before, *same)

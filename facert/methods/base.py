@@ -70,7 +70,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Report:
+class TrainingReport:
     """How training went, for people and for the model file.
 
     Parameters
@@ -113,7 +113,9 @@ class Method(Protocol):
         """d_x and d_y of what it was trained on."""
         ...
 
-    def fit(self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...) -> Report:
+    def fit(
+        self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor = ...
+    ) -> TrainingReport:
         """Learn from labelled frames and whatever unlabelled data the method can use."""
         ...
 

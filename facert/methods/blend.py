@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from facert.data.arrays import FloatArray, rms
-from facert.methods.base import Labelled, Report, Unlabelled, stacked
+from facert.methods.base import Labelled, TrainingReport, Unlabelled, stacked
 from facert.methods.factors import FactorMap
 from facert.methods.folds import ranked_folds
 from facert.methods.processes import Basis, FeatureProcess, ProcessBank
@@ -161,8 +161,8 @@ class BaseMaps:
 def cross_validated_poses(labelled: Labelled, unlabelled: Unlabelled) -> FloatArray:
     """Poses that each of the base maps predicts for labels that it was not given, (3, l, d_y).
 
-    No closed form gives what factors would predict for a label left out: they are learned five
-    times more, each time without the poses of a fifth of the labels, and the processes with them.
+    The factors have no closed form of it: they are learned five times more, each time without the
+    poses of a fifth of the labels, and the processes with them.
     """
     predicted = np.empty((3, *labelled.Y.shape))
     for train, test in ranked_folds(labelled.X):
@@ -178,7 +178,7 @@ class Auto(Regression):
 
     map_type = BlendMap
 
-    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[BlendMap, Report]:
+    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[BlendMap, TrainingReport]:
         _, poses = stacked(labelled, unlabelled)
         bounds = _bounds(unlabelled, poses)
         some = _fewer_poses(unlabelled, self.settings.seed)
@@ -207,7 +207,7 @@ class Auto(Regression):
         )
         shares = {f"weight of {n}": float(w) for n, w in zip(EXPERTS, weights, strict=True)}
         error = rms(np.tensordot(weights, np.array(errors), axes=1))
-        return made, Report(
+        return made, TrainingReport(
             figures={**unlabelled.counts, **shares}, pose_figures={"cross-validation error": error}
         )
 

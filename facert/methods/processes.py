@@ -68,7 +68,7 @@ class ProcessMap(Map):
 
     @property
     def leave_one_out_errors(self) -> FloatArray:
-        """Each pose less what is predicted for it when it alone is left out, (n, d_y)."""
+        """Each pose less its prediction by the process without it, (n, d_y)."""
         return leave_one_out_errors(self.alpha, np.sum(self.whitening**2, axis=1))
 
     @cached_property

@@ -18,7 +18,7 @@ import numpy as np
 from facert.data.array_group import DAMAGED, ArrayGroup, check_axes
 from facert.data.arrays import FloatArray, rms
 from facert.errors import InputError
-from facert.methods.base import Labelled, Prediction, Report, Stream, Unlabelled, stacked
+from facert.methods.base import Labelled, Prediction, Stream, TrainingReport, Unlabelled, stacked
 from facert.models.device import find_device
 from facert.models.gaussian import Gaussian
 from facert.models.optim.monitor import Monitor
@@ -81,7 +81,7 @@ class Regression(ABC):
         labelled: Labelled,
         unlabelled: Unlabelled,
         monitor: Monitor | None = None,  # noqa: ARG002  done in one go: nothing to watch
-    ) -> Report:
+    ) -> TrainingReport:
         """Learn the map, and how the source's dimensions go together.
 
         Parameters
@@ -117,7 +117,7 @@ class Regression(ABC):
         return replace(report, pose_figures=errors)
 
     @abstractmethod
-    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, Report]:
+    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[Map, TrainingReport]:
         """The map, and a report of it."""
 
     def _linear_response(self, frames: FloatArray) -> FloatArray:
@@ -199,9 +199,9 @@ class SupervisedRegression(Regression):
         self,
         labelled: Labelled,
         unlabelled: Unlabelled,  # noqa: ARG002  they only help to fill gaps
-    ) -> tuple[Map, Report]:
+    ) -> tuple[Map, TrainingReport]:
         map_, figures = self._regress(labelled.X, labelled.Y)
-        return map_, Report(figures=figures)
+        return map_, TrainingReport(figures=figures)
 
     @abstractmethod
     def _regress(self, X: FloatArray, Y: FloatArray) -> tuple[Map, dict[str, float]]:

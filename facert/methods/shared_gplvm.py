@@ -22,7 +22,15 @@ from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray, rms
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled, stacked
+from facert.methods.base import (
+    Labelled,
+    Method,
+    Prediction,
+    Stream,
+    TrainingReport,
+    Unlabelled,
+    stacked,
+)
 from facert.methods.noise import with_noise
 from facert.methods.views import view_arrays, view_from
 from facert.models.device import find_device
@@ -92,7 +100,7 @@ class SemiSupervisedSGPLVM:
 
     def fit(
         self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
-    ) -> Report:
+    ) -> TrainingReport:
         """Train the model, Eq. (4), from the alignment of both views or from another model.
 
         Parameters
@@ -117,7 +125,7 @@ class SemiSupervisedSGPLVM:
             self._set_views(*module.posteriors())
         residual = self.predict(labelled.X).Y - labelled.Y
         errors = {"training reconstruction": rms(residual)}
-        return Report(result, self._figures(unlabelled), errors)
+        return TrainingReport(result, self._figures(unlabelled), errors)
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from facert.data.arrays import FloatArray
-from facert.methods.base import Labelled, Report, Unlabelled, stacked
+from facert.methods.base import Labelled, TrainingReport, Unlabelled, stacked
 from facert.methods.processes import Basis, FeatureProcess
 from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
@@ -34,8 +34,10 @@ class SemiSupervisedGPR(Regression):
 
     map_type = ShrunkProcess
 
-    def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[ShrunkProcess, Report]:
+    def _learn(
+        self, labelled: Labelled, unlabelled: Unlabelled
+    ) -> tuple[ShrunkProcess, TrainingReport]:
         frames, poses = stacked(labelled, unlabelled)
         process = FeatureProcess.learn(labelled, Basis.half_whitened(frames), poses.mean(axis=0))
         shrinkage = Shrinkage.learn(poses, process.process.leave_one_out_errors)
-        return ShrunkProcess(process, shrinkage), Report(figures=unlabelled.counts)
+        return ShrunkProcess(process, shrinkage), TrainingReport(figures=unlabelled.counts)

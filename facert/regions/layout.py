@@ -24,7 +24,7 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> RegionL
     """The layout of regions.
 
     Those that share a control have a weight in it by how well their markers predict it: the
-    inverse of the mean squared error at labels left out.
+    inverse of the leave-one-out mean squared error.
 
     Parameters
     ----------

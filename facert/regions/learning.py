@@ -11,7 +11,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import Regions
-from facert.methods.base import Labelled, Method, Report, Unlabelled, WarmStart
+from facert.methods.base import Labelled, Method, TrainingReport, Unlabelled, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
@@ -34,7 +34,7 @@ MOST_FRAMES = 100
 
 
 @dataclass(frozen=True)
-class Start:
+class StartingModel:
     """A trained model for a method to begin at.
 
     Parameters
@@ -57,12 +57,12 @@ class Learned:
     """A trained method, what it reports, and how many seconds its fit took."""
 
     method: Method
-    report: Report
+    report: TrainingReport
     seconds: float
 
 
 def learn(
-    data: TrainingData, settings: Settings, monitor: Monitor, start: Start | None = None
+    data: TrainingData, settings: Settings, monitor: Monitor, start: StartingModel | None = None
 ) -> Learned:
     """Fit the method of the settings to a take; with regions, once for each of them.
 
@@ -73,7 +73,7 @@ def learn(
         Regions that are to be found, and noise that is open, are taken from the data.
     monitor : Monitor
         Watches the optimiser.
-    start : Start, optional
+    start : StartingModel, optional
         What the method begins at; one that learns in one go does without.
 
     Raises
@@ -114,7 +114,7 @@ def _resolved(wanted: Regions | str | None, data: TrainingData) -> Regions | Non
 
 
 def _begin(
-    method: Method, start: Start, source_units: Normalisation, target_units: Normalisation
+    method: Method, start: StartingModel, source_units: Normalisation, target_units: Normalisation
 ) -> None:
     """Let a method begin at a trained one, unless something keeps it from that."""
     new, old = method.settings, start.method.settings

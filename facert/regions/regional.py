@@ -27,7 +27,15 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import MOST
 from facert.errors import InputError
-from facert.methods.base import Labelled, Method, Prediction, Report, Stream, Unlabelled, WarmStart
+from facert.methods.base import (
+    Labelled,
+    Method,
+    Prediction,
+    Stream,
+    TrainingReport,
+    Unlabelled,
+    WarmStart,
+)
 from facert.methods.registry import make_method
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
@@ -93,7 +101,7 @@ class _RegionMethod:
             return self._frames(X), None
         return self._frames(X), input_variance.take(self.columns, axis=1) / self.source_unit**2
 
-    def pose_figures(self, report: Report) -> dict[str, float]:
+    def pose_figures(self, report: TrainingReport) -> dict[str, float]:
         """Errors that the region reports, in the units of the face."""
         return {name: value * self.target_unit for name, value in report.pose_figures.items()}
 
@@ -154,7 +162,7 @@ class Regional:
         labelled: Labelled,
         unlabelled: Unlabelled,
         monitor: Monitor | None = None,  # noqa: ARG002  regions would look alike to it
-    ) -> Report:
+    ) -> TrainingReport:
         """Train the method of each region on its part of the data.
 
         Parameters
@@ -178,7 +186,9 @@ class Regional:
         errors = [part.pose_figures(r) for part, r in zip(self.parts_, reports, strict=True)]
         figures = [report.figures for report in reports]
         names = self._names
-        return Report(figures=_together(names, figures), pose_figures=_together(names, errors))
+        return TrainingReport(
+            figures=_together(names, figures), pose_figures=_together(names, errors)
+        )
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""

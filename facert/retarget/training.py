@@ -15,7 +15,7 @@ from facert.methods.registry import method_class
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.preparation import TrainingData, training_data
-from facert.regions.learning import Learned, Start, learn
+from facert.regions.learning import Learned, StartingModel, learn
 from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
@@ -98,7 +98,7 @@ def check_poses(take: Take) -> None:
         log.warning("%s with a standard deviation: predicted, and learned from as labels", poses)
 
 
-def _start(start: Retargeter, data: TrainingData) -> Start:
+def _start(start: Retargeter, data: TrainingData) -> StartingModel:
     """A trained model to begin at, and what keeps it from being one for this take."""
     forms = {
         "kind of source": (data.layout.kind, start.layout.kind),
@@ -107,7 +107,7 @@ def _start(start: Retargeter, data: TrainingData) -> Start:
         "controls": (data.controls.names, start.controls.names),
     }
     difference = next((what for what, (here, there) in forms.items() if here != there), None)
-    return Start(start.method, start.source_units, start.target_units, difference)
+    return StartingModel(start.method, start.source_units, start.target_units, difference)
 
 
 def _noise_figures(found: MotionEstimate | None, unit: str) -> dict[str, Any]:

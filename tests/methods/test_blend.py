@@ -51,13 +51,13 @@ def test_it_is_better_than_each_supervised_method_and_unlabelled_data_is_why():
     assert error("auto", unlabelled) < 0.8 * error("auto", nothing)
 
 
-def test_poses_lie_between_what_the_experts_say(auto):
+def test_poses_lie_between_those_of_the_experts(auto):
     test = data()[2]
     map_ = auto.map_
     factors, missed = map_.factors(test.X)[0], map_.residual(test.X)[0]
     low, high = map_.range
     clipped = np.clip(factors, low, high)
-    said = np.clip(
+    predicted = np.clip(
         [
             map_.plain(test.X)[0],
             map_.whitened(test.X)[0],
@@ -68,7 +68,9 @@ def test_poses_lie_between_what_the_experts_say(auto):
         high,
     )
     pose = auto.predict(test.X).Y
-    np.testing.assert_allclose(pose, sum(w * s for w, s in zip(map_.weights, said, strict=True)))
+    np.testing.assert_allclose(
+        pose, sum(w * s for w, s in zip(map_.weights, predicted, strict=True))
+    )
 
 
 def test_no_pose_leaves_the_range_of_those_that_are_known(auto):
@@ -79,7 +81,7 @@ def test_no_pose_leaves_the_range_of_those_that_are_known(auto):
     assert (pose <= poses.max(axis=0) + 1e-12).all()
 
 
-def test_the_error_that_is_told_is_about_the_true_one():
+def test_the_error_that_is_reported_is_about_the_true_one():
     labelled, unlabelled, test = data(labels=40)
     method = Auto(Settings())
     report = method.fit(labelled, unlabelled)

@@ -216,12 +216,12 @@ def test_a_device_that_is_not_there_is_never_replaced_in_silence(name, device):
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
-def test_a_method_that_has_no_use_for_a_device_says_so(caplog):
+def test_a_method_that_has_no_use_for_a_device_warns(caplog):
     make_method(Settings(method="auto", device="cuda")).fit(*make_data())
     assert "auto trains on the CPU: cuda is not used" in caplog.text
 
 
-def test_an_unknown_method_is_told_with_the_known_ones():
+def test_an_unknown_method_is_named_with_the_known_ones():
     known = ", ".join(REGISTRY)
     with pytest.raises(InputError, match=f"method: expected one of {known}, found 'magic'"):
         make_method(Settings(method="magic"))

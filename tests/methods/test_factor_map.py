@@ -1,4 +1,4 @@
-"""Factors as a map, and what they would say of labels left out."""
+"""Factors as a map, and the base maps in cross-validation."""
 
 import numpy as np
 
@@ -76,29 +76,29 @@ def test_ranked_folds_do_not_depend_on_the_order_of_frames():
         np.testing.assert_array_equal(a, b)
 
 
-def test_three_labels_are_left_out_one_by_one():
+def test_three_labels_make_three_folds():
     X = np.random.default_rng(0).normal(size=(3, 2))
     assert [len(test) for _, test in ranked_folds(X)] == [1, 1, 1]
 
 
-def test_what_is_said_of_labels_left_out_does_not_depend_on_their_poses():
+def test_cross_validated_poses_do_not_depend_on_the_labels_own_poses():
     labelled, unlabelled = data()
-    said = cross_validated_poses(labelled, unlabelled)
-    assert said.shape == (3, 11, 5)
+    predicted = cross_validated_poses(labelled, unlabelled)
+    assert predicted.shape == (3, 11, 5)
     _, test = ranked_folds(labelled.X)[2]
     poses = labelled.Y.copy()
     poses[test] = 99.0
     again = cross_validated_poses(Labelled(labelled.X, poses), unlabelled)
-    np.testing.assert_array_equal(again[:, test], said[:, test])
+    np.testing.assert_array_equal(again[:, test], predicted[:, test])
     others = np.delete(np.arange(11), test)
-    assert (np.abs(again[:, others] - said[:, others]).max(axis=(1, 2)) > 0.1).all()
+    assert (np.abs(again[:, others] - predicted[:, others]).max(axis=(1, 2)) > 0.1).all()
 
 
-def test_what_is_said_of_labels_left_out_is_what_a_map_without_them_says():
+def test_cross_validated_poses_are_those_of_maps_without_the_fold():
     labelled, unlabelled = data()
-    said = cross_validated_poses(labelled, unlabelled)
+    predicted = cross_validated_poses(labelled, unlabelled)
     train, test = ranked_folds(labelled.X)[0]
     frames = np.vstack([unlabelled.X, labelled.X[test]])
     rest = Labelled(labelled.X[train], labelled.Y[train])
     maps = BaseMaps.learn(rest, Unlabelled(frames, unlabelled.Y))
-    np.testing.assert_array_equal(maps(labelled.X[test]), said[:, test])
+    np.testing.assert_array_equal(maps(labelled.X[test]), predicted[:, test])

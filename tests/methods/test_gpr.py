@@ -49,7 +49,7 @@ def test_kernel_parameters_that_make_no_kernel_are_refused(theta):
         ProcessMap(X, Y, np.array(theta, dtype=float))
 
 
-def test_leave_one_out_errors_are_those_of_leaving_labels_out():
+def test_leave_one_out_errors_are_those_of_refitting():
     X, Y = frames_and_poses()
     theta = np.array([0.5, 2.0, 50.0, 0.2])
     errors = ProcessMap(X, Y, theta).leave_one_out_errors

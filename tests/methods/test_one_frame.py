@@ -86,27 +86,27 @@ def test_far_off_frames_are_no_special_case(blend, problem):
 
 
 @pytest.mark.parametrize("name", ["auto", "ssgpr", "ridge", "svr"])
-def test_gaps_and_doubt_mean_the_same_in_a_stream(name, problem):
+def test_gaps_and_input_variance_mean_the_same_in_a_stream(name, problem):
     method, rng = fitted(name, problem), np.random.default_rng(0)
     frames = problem[2][:20]
     hidden = np.where(rng.random(frames.shape) < 0.2, np.nan, frames)
-    doubt = rng.random(frames.shape)
-    for X, R in ((frames, None), (hidden, None), (frames, doubt)):
+    variance = rng.random(frames.shape)
+    for X, R in ((frames, None), (hidden, None), (frames, variance)):
         expected, stream = method.predict(X, R), method.stream()
         for row in range(len(X)):
-            said = stream.step(X[row : row + 1], None if R is None else R[row : row + 1])
-            np.testing.assert_allclose(said.Y[0], expected.Y[row], atol=EXACT)
-            np.testing.assert_allclose(said.X[0], expected.X[row], atol=EXACT)
-            assert (said.std is None) == (expected.std is None)
-            if said.std is not None:
-                np.testing.assert_allclose(said.std[0], expected.std[row], atol=EXACT)
+            streamed = stream.step(X[row : row + 1], None if R is None else R[row : row + 1])
+            np.testing.assert_allclose(streamed.Y[0], expected.Y[row], atol=EXACT)
+            np.testing.assert_allclose(streamed.X[0], expected.X[row], atol=EXACT)
+            assert (streamed.std is None) == (expected.std is None)
+            if streamed.std is not None:
+                np.testing.assert_allclose(streamed.std[0], expected.std[row], atol=EXACT)
 
 
 def test_a_std_that_is_asked_for_late_is_that_of_its_own_frame(problem):
     method, frames = fitted("auto", problem), problem[2][:10]
     stream = method.stream()
-    said = [stream.step(frame[None]) for frame in frames]
-    std = [one.std[0] for one in reversed(said)]
+    streamed = [stream.step(frame[None]) for frame in frames]
+    std = [one.std[0] for one in reversed(streamed)]
     np.testing.assert_allclose(std[::-1], method.predict(frames).std, atol=EXACT)
 
 

@@ -80,7 +80,7 @@ def test_interpolation_goes_through_the_poses_and_is_scipys():
     np.testing.assert_allclose(method.predict(frames).Y, theirs(frames), atol=1e-10)
 
 
-def test_packed_machines_say_what_each_machine_says():
+def test_packed_machines_predict_what_each_machine_predicts():
     X, Y = linear_data(noise=0.1)
     frames = linear_data(seed=1)[0]
     widths = np.array([0.01, 0.1])

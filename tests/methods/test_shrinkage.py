@@ -14,14 +14,14 @@ def test_a_perfect_regression_is_not_shrunk_and_a_useless_one_becomes_the_mean()
     np.testing.assert_allclose(useless(poses), np.tile(poses.mean(axis=0), (200, 1)), atol=1e-6)
 
 
-def test_a_control_that_is_predicted_badly_is_told_by_the_one_it_goes_with():
+def test_a_control_that_is_predicted_badly_follows_the_one_it_goes_with():
     x = np.random.default_rng(0).normal(size=500)
     poses = np.column_stack([x, 2.0 * x])
     shrinkage = Shrinkage.learn(poses, np.tile([0.01, 100.0], (20, 1)))
     away = np.array([[1.0, -50.0], [0.0, 50.0]])
-    told = shrinkage(shrinkage.mean + away) - shrinkage.mean
+    shrunk = shrinkage(shrinkage.mean + away) - shrinkage.mean
 
-    np.testing.assert_allclose(told, [[1.0, 2.0], [0.0, 0.0]], atol=0.05)
+    np.testing.assert_allclose(shrunk, [[1.0, 2.0], [0.0, 0.0]], atol=0.05)
 
 
 def test_it_is_the_most_probable_pose():

@@ -1,4 +1,4 @@
-"""Regions that a take tells by itself."""
+"""Regions found in a take."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def test_brows_and_mouth_come_apart(seed, together):
     assert BETWEEN not in found
 
 
-def test_names_that_do_not_speak_leave_it_to_the_labels():
+def test_names_without_a_side_leave_it_to_the_labels():
     take, above, _ = make_face([f"control{i}" for i in range(6)], labels=30)
     found = parts(take)
     assert found[UPPER].markers == above  # the calmer ones
@@ -127,7 +127,7 @@ def test_three_weights_are_too_few_to_part():
     assert len(find_regions(take).parts) == 1
 
 
-def test_sides_are_told_by_the_groups_of_names():
+def test_sides_follow_from_the_groups_of_names():
     names = ["browDown_L", "eyeWide", "cheekPuff", "nose-left-elevation", "jaw_open", "control3"]
     np.testing.assert_array_equal(sides_by_name(names), [1.0, 1.0, 0.0, 0.0, -1.0, np.nan])
 

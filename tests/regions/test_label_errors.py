@@ -34,7 +34,7 @@ def test_neither_unit_nor_origin_matters():
     np.testing.assert_allclose(moved, label_errors(frames, labelled, poses), rtol=1e-6)
 
 
-def test_what_never_moves_tells_nothing():
+def test_what_never_moves_has_an_error_of_one():
     frames, labelled, poses = make_data()
     poses[:, 2] = 0.3
     assert label_errors(frames, labelled, poses)[2] == 1.0

@@ -73,7 +73,7 @@ def test_one_region_of_everything_is_the_method_itself(name, take):
 
 
 @every_method
-def test_a_saved_and_loaded_model_says_the_same(name, trained, take, tmp_path):
+def test_a_saved_and_loaded_model_predicts_the_same(name, trained, take, tmp_path):
     trained(name).save(tmp_path / "model.safetensors")
     loaded = facert.load(tmp_path / "model.safetensors")
     assert loaded.settings == trained(name).settings
@@ -92,7 +92,7 @@ def test_gaps_are_filled_and_every_frame_gets_a_pose(name, trained, take):
 
 
 @every_method
-def test_a_region_does_not_hear_of_the_markers_of_others(name, trained, take):
+def test_a_region_does_not_depend_on_the_markers_of_others(name, trained, take):
     values = take.source.values.copy()
     values[:, 4] += np.random.default_rng(0).normal(size=values[:, 4].shape)
     shaken = replace(take, source=replace(take.source, values=values))
@@ -105,7 +105,7 @@ def test_a_region_does_not_hear_of_the_markers_of_others(name, trained, take):
     assert controls["smile"] > 0.0
 
 
-def test_known_poses_are_told_apart_and_poses_completed(trained, take):
+def test_known_poses_are_recognised_and_poses_completed(trained, take):
     retargeter = trained("ridge")
     assert len(retargeter.without_known(take).labels) == 0
     assert facert.complete_pose(retargeter, {"jaw": 0.1}).pose[0] == 0.1
@@ -125,13 +125,13 @@ def test_a_shared_control_is_the_weighted_mean_of_its_regions(take):
     frames = np.random.default_rng(0).normal(size=(7, 15))
     row = take.controls.names.index("smile")
     layout = apart[0].layout_
-    said = []
+    predicted = []
     for method, share in zip(apart, (0.5, 1.0, 0.0), strict=True):
         weights = layout.weights.copy()
         weights[:, row] = share, 1.0 - share
         method.layout_ = replace(layout, weights=weights)
-        said.append(method.predict(frames).Y[:, row])
-    np.testing.assert_allclose(said[0], (said[1] + said[2]) / 2.0, atol=1e-12)
+        predicted.append(method.predict(frames).Y[:, row])
+    np.testing.assert_allclose(predicted[0], (predicted[1] + predicted[2]) / 2.0, atol=1e-12)
 
 
 def test_the_region_that_predicts_a_shared_control_weighs_more(take):
@@ -175,7 +175,7 @@ def test_a_marker_in_no_region_stays_as_it_is(take):
     np.testing.assert_allclose(source[:, [2, 4]], take.source.values[:, [2, 4]], atol=1e-12)
 
 
-def test_a_region_in_which_nothing_moves_is_told(take):
+def test_a_region_in_which_nothing_moves_is_refused(take):
     params = np.where(np.isin(take.controls.names, ["jaw"]), 0.0 * take.params, take.params)
     still = replace(take, params=params, animation=None)
     alone = Regions((UPPER, replace(LOWER, controls=("jaw",))))
@@ -187,7 +187,7 @@ def test_figures_of_regions_bear_their_names(trained):
     figures = trained("auto").figures
     assert "upper: weight of factors" in figures
     assert "lower: weight of factors" in figures
-    assert figures["unlabelled frames"] == 10  # the same for both: said once
+    assert figures["unlabelled frames"] == 10  # the same for both: shown once
 
 
 GOOD = {
@@ -230,11 +230,11 @@ def test_a_damaged_model_is_refused(trained):
         Regional(settings).load(arrays)
 
 
-def test_errors_of_the_regions_are_told_in_the_units_of_the_controls(take, trained):
+def test_errors_of_the_regions_have_the_units_of_the_controls(take, trained):
     percent = replace(take, params=100.0 * take.params, animation=100.0 * take.animation)
     by_percent = facert.train(percent, Settings(method="auto", regions=TWO, **QUICK)).figures
     figures = trained("auto").figures
-    told = [name for name in figures if "cross-validation error" in name]
-    assert [name.split(":")[0] for name in told] == ["lower", "upper"]
-    for name in told:
+    errors = [name for name in figures if "cross-validation error" in name]
+    assert [name.split(":")[0] for name in errors] == ["lower", "upper"]
+    for name in errors:
         assert by_percent[name] == pytest.approx(100.0 * figures[name], rel=1e-6)
