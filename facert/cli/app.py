@@ -35,6 +35,7 @@ from facert.cli.commands import (
 )
 from facert.cli.shared import console
 from facert.cli.shared.help import Command, Group
+from facert.cli.shared.options import option
 from facert.data.version import CREATED_BY
 from facert.errors import FacertError
 
@@ -78,13 +79,10 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def options(
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Only warnings and errors.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details as well.")] = False,
+    quiet: Annotated[bool, option("Only warnings and errors.", "--quiet", "-q")] = False,
+    verbose: Annotated[bool, option("Details as well.", "--verbose", "-v")] = False,
     _version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
+        bool, option("Print the version.", "--version", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
     """Options before or after the command."""

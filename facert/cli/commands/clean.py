@@ -6,12 +6,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan
 from facert.cli.shared.files import read_observed, write_beside
-from facert.cli.shared.options import ENDING, JOBS, NO_DETECT, OUT_DIR, OVERWRITE, SIGMA, TARGET
+from facert.cli.shared.options import (
+    ENDING,
+    JOBS,
+    NO_DETECT,
+    OUT_DIR,
+    OVERWRITE,
+    SIGMA,
+    TARGET,
+    argument,
+    option,
+)
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -23,15 +31,14 @@ if TYPE_CHECKING:
 def command(
     paths: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="IN OUT",
-            help="Take with gaps and noise, and result: .h5, with its uncertainty, or .csv. With "
+        argument(
+            "IN OUT",
+            "Take with gaps and noise, and result: .h5, with its uncertainty, or .csv. With "
             "--out-dir: any number of takes, or folders of takes.",
         ),
     ],
     model: Annotated[
-        Path | None,
-        typer.Option("--model", "-m", help="Clean by this model of train, not by the take alone."),
+        Path | None, option("Clean by this model of train, not by the take alone.", "--model", "-m")
     ] = None,
     no_detect: NO_DETECT = False,
     sigma: SIGMA = None,

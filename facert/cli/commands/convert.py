@@ -6,11 +6,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan, require_kept
-from facert.cli.shared.options import ENDING, JOBS, OUT_DIR, OVERWRITE, RIG, SHAPES, file_option
+from facert.cli.shared.options import (
+    ENDING,
+    JOBS,
+    OUT_DIR,
+    OVERWRITE,
+    RIG,
+    SHAPES,
+    argument,
+    file_option,
+    option,
+)
 from facert.io.registry import listed
 
 if TYPE_CHECKING:
@@ -21,9 +29,9 @@ if TYPE_CHECKING:
 def command(
     paths: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="IN OUT",
-            help=f"IN: a take ({listed('read', 'take')}), a rig ({listed('read', 'rig')}, folder of"
+        argument(
+            "IN OUT",
+            f"IN: a take ({listed('read', 'take')}), a rig ({listed('read', 'rig')}, folder of"
             f" .obj) or a mesh sequence. OUT, by whose ending the format is chosen:"
             f" {listed('write', 'take')}; {listed('write', 'morphs')} for a rig, and with --rig for"
             " a take. With --out-dir: any number of files, or folders of takes.",
@@ -31,35 +39,30 @@ def command(
     ],
     kind: Annotated[
         Literal["take", "rig"] | None,
-        typer.Option(help="What to read of a .glb that holds both; else the rig."),
+        option("What to read of a .glb that holds both; else the rig."),
     ] = None,
     target: Annotated[
-        str | None,
-        file_option("--target", "Which target of an .npz track, or animation of a .glb."),
+        str | None, file_option("Which target of an .npz track, or animation of a .glb.")
     ] = None,
     shapes: SHAPES = None,
     map_path: Annotated[
-        Path | None, file_option("--map", 'New names: theirs = "ours".', metavar="TOML")
+        Path | None, file_option('New names: theirs = "ours".', "--map", metavar="TOML")
     ] = None,
     poses_path: Annotated[
         Path | None,
-        file_option("--poses", "Labels from another file, by its column frame or by time."),
+        file_option("Labels from another file, by its column frame or by time.", "--poses"),
     ] = None,
     in_fps: Annotated[
-        float | None, typer.Option(min=1e-3, help="Frames a second of IN, if it states none.")
+        float | None, option("Frames a second of IN, if it states none.", min=1e-3)
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(min=1e-3, help="Frames a second of OUT: resampled by time.")
+        float | None, option("Frames a second of OUT: resampled by time.", min=1e-3)
     ] = None,
-    in_units: Annotated[str, typer.Option(help="Unit of IN, instead of the one it states.")] = "",
-    units: Annotated[
-        str, typer.Option(help="Unit of OUT: m, cm, mm, in or ft; numbers are converted.")
-    ] = "",
-    in_up_axis: Annotated[
-        str, typer.Option(help="The axis up in IN, instead of the one it states.")
-    ] = "",
-    up_axis: Annotated[str, typer.Option(help="The axis up in OUT: y, z or x; turned.")] = "",
-    start_timecode: Annotated[str, typer.Option(help="Of the first frame, HH:MM:SS:FF.")] = "",
+    in_units: Annotated[str, option("Unit of IN, instead of the one it states.")] = "",
+    units: Annotated[str, option("Unit of OUT: m, cm, mm, in or ft; numbers are converted.")] = "",
+    in_up_axis: Annotated[str, option("The axis up in IN, instead of the one it states.")] = "",
+    up_axis: Annotated[str, option("The axis up in OUT: y, z or x; turned.")] = "",
+    start_timecode: Annotated[str, option("Of the first frame, HH:MM:SS:FF.")] = "",
     rig_path: RIG = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,

@@ -5,16 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SEED
+from facert.cli.shared.options import OVERWRITE, SEED, argument
 
 
 def command(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Where to write.", show_default=True)
-    ] = Path("facert-demo"),
+    folder: Annotated[Path, argument("DIR", "Where to write.", show_default=True)] = Path(
+        "facert-demo"
+    ),
     seed: SEED = 0,
     overwrite: OVERWRITE = False,
 ) -> None:

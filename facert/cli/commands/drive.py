@@ -9,7 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, warn_of_unit
-from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
+from facert.cli.shared.options import OVERWRITE, SHAPES, argument, file_option, option
 from facert.data.text import plural
 from facert.io.registry import endings
 
@@ -23,51 +23,40 @@ Fit = Literal["none", "uniform", "axes"]
 
 
 def command(
-    mesh_path: Annotated[
-        Path, typer.Argument(metavar="MESH", help="The face at rest: a rig, .obj or .ply.")
-    ],
-    points_path: Annotated[
-        Path, typer.Argument(metavar="POINTS", help="A take whose markers are feature points.")
-    ],
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="A mesh sequence (.h5), or morph targets (.glb).")
-    ],
+    mesh_path: Annotated[Path, argument("MESH", "The face at rest: a rig, .obj or .ply.")],
+    points_path: Annotated[Path, argument("POINTS", "A take whose markers are feature points.")],
+    output: Annotated[Path, argument("OUT", "A mesh sequence (.h5), or morph targets (.glb).")],
     map_path: Annotated[
-        Path | None, file_option("--map", "The vertex of each point: chin = 1204.", metavar="TOML")
+        Path | None, file_option("The vertex of each point: chin = 1204.", "--map", metavar="TOML")
     ] = None,
     auto: Annotated[
-        bool, typer.Option("--auto", help="Each point drives the vertex nearest to it at rest.")
+        bool, option("Each point drives the vertex nearest to it at rest.", "--auto")
     ] = False,
-    rest: Annotated[
-        int, typer.Option(min=0, help="The frame of POINTS in which their face rests.")
-    ] = 0,
+    rest: Annotated[int, option("The frame of POINTS in which their face rests.", min=0)] = 0,
     fit: Annotated[
-        Fit, typer.Option(help="Carry over points of another face, scaled as a whole or by axis.")
+        Fit, option("Carry over points of another face, scaled as a whole or by axis.")
     ] = "none",
     carry: Annotated[
-        bool, typer.Option("--carry", help="Parts without a point follow the face rigidly.")
+        bool, option("Parts without a point follow the face rigidly.", "--carry")
     ] = False,
     method: Annotated[
         str,
-        typer.Option(
-            help="smooth, framework, literal (the paper's, as printed), laplacian, cotangent, "
+        option(
+            "smooth, framework, literal (the paper's, as printed), laplacian, cotangent, "
             "biharmonic, rbf-linear or rbf-thin-plate."
         ),
     ] = "smooth",
     tolerance: Annotated[
         float,
-        typer.Option(
+        option(
+            "For .glb: how far off a vertex may be, in percent of the largest displacement. "
+            "More makes fewer targets and a smaller file.",
             min=0.0,
             max=100.0,
-            help="For .glb: how far off a vertex may be, in percent of the largest displacement. "
-            "More makes fewer targets and a smaller file.",
         ),
     ] = 0.5,
     in_units: Annotated[
-        str | None,
-        typer.Option(
-            "--in-units", help="Unit of MESH, instead of the one it states: m, cm, mm, in or ft."
-        ),
+        str | None, option("Unit of MESH, instead of the one it states: m, cm, mm, in or ft.")
     ] = None,
     shapes: SHAPES = None,
     overwrite: OVERWRITE = False,

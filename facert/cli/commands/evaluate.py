@@ -11,7 +11,17 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_json, save_picture
-from facert.cli.shared.options import DEVICE, OVERWRITE, RIG, SEED, SHAPES, TARGET, file_option
+from facert.cli.shared.options import (
+    DEVICE,
+    OVERWRITE,
+    RIG,
+    SEED,
+    SHAPES,
+    TARGET,
+    argument,
+    file_option,
+    option,
+)
 from facert.data.ranges import parse_range
 from facert.data.text import plural
 from facert.errors import InputError, OutputExistsError, reading
@@ -35,57 +45,51 @@ WIDEST = 160
 def command(
     take: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="TAKE",
-            help="Take with true poses, in all frames or some; by default the built-in one.",
+        argument(
+            "TAKE", "Take with true poses, in all frames or some; by default the built-in one."
         ),
     ] = None,
     labels: Annotated[
         str | None,
-        typer.Option(
-            help="Labelled frames: a..b, a..b:step, or numbers with commas.",
+        option(
+            "Labelled frames: a..b, a..b:step, or numbers with commas.",
             show_default="10..40, fewer where few are posed",
         ),
     ] = None,
     methods: Annotated[
-        str, typer.Option(help="all, or names with commas, of " + ", ".join(REGISTRY) + ".")
+        str, option("all, or names with commas, of " + ", ".join(REGISTRY) + ".")
     ] = "all",
-    repeats: Annotated[int, typer.Option(min=1, help="Random draws of each.")] = 20,
+    repeats: Annotated[int, option("Random draws of each.", min=1)] = 20,
     unlabelled: Annotated[
         str | None,
-        typer.Option(
-            help="Unlabelled frames, and as many poses: one number, range or list.",
+        option(
+            "Unlabelled frames, and as many poses: one number, range or list.",
             show_default="100, fewer where there are fewer",
         ),
     ] = None,
     noise: Annotated[
-        float, typer.Option(help="Noise, as a share of the largest deviation of a coordinate.")
+        float, option("Noise, as a share of the largest deviation of a coordinate.")
     ] = 0.0,
-    missing: Annotated[
-        float, typer.Option(help="Share of the markers to hide in test frames.")
-    ] = 0.0,
+    missing: Annotated[float, option("Share of the markers to hide in test frames.")] = 0.0,
     split: Annotated[
-        Literal["random", "block"],
-        typer.Option(help="Test on any other frames, or on other blocks of time."),
+        Literal["random", "block"], option("Test on any other frames, or on other blocks of time.")
     ] = "random",
-    across: Annotated[Path | None, file_option("--across", "Test on this take instead.")] = None,
+    across: Annotated[Path | None, file_option("Test on this take instead.")] = None,
     rig: RIG = None,
     shapes: SHAPES = None,
     test_frames: Annotated[
-        int | None, typer.Option(help="Test on so many frames at most.", show_default="all")
+        int | None, option("Test on so many frames at most.", show_default="all")
     ] = None,
     target: TARGET = None,
     seed: SEED = 0,
     device: DEVICE = "cpu",
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
-    ] = None,
+    jobs: Annotated[int | None, option("Processes.", min=1, show_default="one a core")] = None,
     json_path: Annotated[
         Path | None,
-        file_option("--json", "All figures; an interrupted run continues from beside it."),
+        file_option("All figures; an interrupted run continues from beside it.", "--json"),
     ] = None,
     plot: Annotated[
-        Path | None, file_option("--plot", "Picture of RMS against labels and unlabelled frames.")
+        Path | None, file_option("Picture of RMS against labels and unlabelled frames.")
     ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:

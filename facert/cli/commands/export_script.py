@@ -9,13 +9,13 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import save_text
-from facert.cli.shared.options import OVERWRITE
+from facert.cli.shared.options import OVERWRITE, argument, option
 
 
 def command(
-    program: Annotated[Literal["blender", "maya"], typer.Argument(metavar="blender|maya")],
+    program: Annotated[Literal["blender", "maya"], argument("blender|maya")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write it here instead of to stdout.")
+        Path | None, option("Write it here instead of to stdout.", "--output", "-o")
     ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:

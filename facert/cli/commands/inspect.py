@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import AS_JSON, SHAPES, TARGET
+from facert.cli.shared.options import AS_JSON, SHAPES, TARGET, argument
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 
 def command(
-    path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A take, a rig, a mesh sequence or a model.")
-    ],
+    path: Annotated[Path, argument("FILE", "A take, a rig, a mesh sequence or a model.")],
     target: TARGET = None,
     shapes: SHAPES = None,
     as_json: AS_JSON = False,

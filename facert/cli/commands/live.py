@@ -27,6 +27,7 @@ from facert.cli.shared.options import (
     TARGET,
     chosen_options,
     file_option,
+    option,
 )
 
 if TYPE_CHECKING:
@@ -44,34 +45,33 @@ PRIORITY = 10
 def command(
     source: Annotated[
         str,
-        typer.Option(
+        option(
+            "livelink:11111 (Live Link Face), vmc:39540, osc:9000, ifacialmocap:49983, "
+            "or take:FILE, played in real time.",
             "--in",
             metavar="KIND[:PORT]",
-            help="livelink:11111 (Live Link Face), vmc:39540, osc:9000, ifacialmocap:49983, "
-            "or take:FILE, played in real time.",
         ),
     ],
     outputs: Annotated[
         list[str],
-        typer.Option(
+        option(
+            "vmc:127.0.0.1:39539, osc:HOST:PORT, livelink:HOST:PORT, csv:FILE or h5:FILE; "
+            "again for more.",
             "--out",
             metavar="KIND[:HOST[:PORT]]",
-            help="vmc:127.0.0.1:39539, osc:HOST:PORT, livelink:HOST:PORT, csv:FILE or h5:FILE; "
-            "again for more.",
         ),
     ],
     model: Annotated[
-        Path,
-        typer.Option("--model", "-m", help="Model file; a new one is taken over when it changes."),
+        Path, option("Model file; a new one is taken over when it changes.", "--model", "-m")
     ] = DEFAULT_MODEL,
     listen: Annotated[
         str,
-        typer.Option(
+        option(
+            "Where to listen: by default to this machine alone; 0.0.0.0 for a phone.",
             metavar="ADDRESS",
-            help="Where to listen: by default to this machine alone; 0.0.0.0 for a phone.",
         ),
     ] = "127.0.0.1",
-    speed: Annotated[float, typer.Option(min=0.01, max=100, help="Of a played take.")] = 1.0,
+    speed: Annotated[float, option("Of a played take.", min=0.01, max=100)] = 1.0,
     target: TARGET = None,
     controls_path: CONTROLS = None,
     no_detect: NO_DETECT = False,
@@ -79,20 +79,18 @@ def command(
     sigma: SIGMA = None,
     neutral: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "The actor rests for so long at first; that makes up for another day's markers.",
             min=0.1,
             max=60.0,
             metavar="SECONDS",
-            help="The actor rests for so long at first; that makes up for another day's markers.",
         ),
     ] = None,
     record: Annotated[
-        Path | None, file_option("--record", "Take of what comes in: .h5, .csv, .livelink.csv.")
+        Path | None, file_option("Take of what comes in: .h5, .csv, .livelink.csv.")
     ] = None,
-    frames: Annotated[
-        int | None, typer.Option(min=1, help="Stop after so many; else Ctrl-C does.")
-    ] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many.")] = None,
+    frames: Annotated[int | None, option("Stop after so many; else Ctrl-C does.", min=1)] = None,
+    seconds: Annotated[float | None, option("Stop after so many.", min=0.1)] = None,
     as_json: AS_JSON = False,
     overwrite: OVERWRITE = False,
 ) -> None:

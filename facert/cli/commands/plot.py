@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
-from facert.cli.shared.options import OVERWRITE, TARGET, TRUTH
+from facert.cli.shared.options import OVERWRITE, TARGET, TRUTH, argument, option
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -19,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def command(
-    take_path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take with poses.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT.png", help="The picture.")],
+    take_path: Annotated[Path, argument("TAKE", "A take with poses.")],
+    output: Annotated[Path, argument("OUT.png", "The picture.")],
     truth_path: TRUTH = None,
     controls: Annotated[
-        str, typer.Option(help="For instance smile,jaw_open; by default the most varying.")
+        str, option("For instance smile,jaw_open; by default the most varying.")
     ] = "",
     target: TARGET = None,
     overwrite: OVERWRITE = False,

@@ -10,7 +10,7 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
 from facert.cli.shared.help import Command, Group
-from facert.cli.shared.options import OVERWRITE, SHAPES, file_option
+from facert.cli.shared.options import OVERWRITE, SHAPES, argument, file_option, option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -29,13 +29,9 @@ def points() -> None:
 
 @app.command("suggest", cls=Command)
 def suggest(
-    rig_path: Annotated[
-        Path, typer.Argument(metavar="RIG", help="A rig file, .npz or folder of .obj.")
-    ],
-    count: Annotated[int, typer.Option("-n", min=1, help="How many points.")] = 80,
-    picture: Annotated[
-        Path | None, file_option("--picture", "Draw them on the face.", metavar="PNG")
-    ] = None,
+    rig_path: Annotated[Path, argument("RIG", "A rig file, .npz or folder of .obj.")],
+    count: Annotated[int, option("How many points.", "-n", min=1)] = 80,
+    picture: Annotated[Path | None, file_option("Draw them on the face.", metavar="PNG")] = None,
     shapes: SHAPES = None,
     overwrite: OVERWRITE = False,
 ) -> None:

@@ -20,6 +20,7 @@ from facert.cli.shared.options import (
     SHAPES,
     TARGET,
     file_option,
+    option,
 )
 from facert.errors import InputError, reading
 
@@ -35,59 +36,46 @@ SMALL = 0.005  # of a control's range: such values are not worth a line
 
 def command(
     wanted: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A control; again for more."),
+        list[str] | None, option("A control; again for more.", "--set", metavar="NAME=VALUE")
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="A take (.h5, .csv, .livelink.csv), or .json; --view: TAKE.posed.h5.",
+        option(
+            "A take (.h5, .csv, .livelink.csv), or .json; --view: TAKE.posed.h5.", "--output", "-o"
         ),
     ] = None,
     model: Annotated[
         Path | None,
-        typer.Option(
-            "--model", "-m", help="Model file that train wrote.", show_default=str(DEFAULT_MODEL)
-        ),
+        option("Model file that train wrote.", "--model", "-m", show_default=str(DEFAULT_MODEL)),
     ] = None,
     poses: Annotated[
-        Path | None, file_option("--poses", "A take with known poses, instead of a model's.")
+        Path | None, file_option("A take with known poses, instead of a model's.")
     ] = None,
     start: Annotated[
         str,
-        typer.Option(
+        option(
+            "Correct this retargeted frame: all its controls follow, but for those of --hold.",
             "--from",
             metavar="TAKE:FRAME",
-            help="Correct this retargeted frame: all its controls follow, but for those of --hold.",
         ),
     ] = "",
     hold: Annotated[
         list[str] | None,
-        typer.Option(
-            "--hold",
+        option(
+            "With --from: controls that keep their value, as 'mouth*'; again for more.",
             metavar="PATTERN",
-            help="With --from: controls that keep their value, as 'mouth*'; again for more.",
         ),
     ] = None,
-    soft: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviation of the values; 0: exactly.")
-    ] = 0.0,
-    samples: Annotated[int, typer.Option(min=0, max=10_000, help="Other plausible poses.")] = 0,
+    soft: Annotated[float, option("Standard deviation of the values; 0: exactly.", min=0.0)] = 0.0,
+    samples: Annotated[int, option("Other plausible poses.", min=0, max=10_000)] = 0,
     seed: SEED = 0,
     target: TARGET = None,
     overwrite: OVERWRITE = False,
     view: Annotated[
-        bool,
-        typer.Option(
-            "--view", help="Pose in the browser, with sliders; with --rig, --take, --actor."
-        ),
+        bool, option("Pose in the browser, with sliders; with --rig, --take, --actor.", "--view")
     ] = False,
     rig: RIG = None,
-    take: Annotated[
-        Path | None, file_option("--take", "The recording to pose, for --view.")
-    ] = None,
+    take: Annotated[Path | None, file_option("The recording to pose, for --view.")] = None,
     actor: ACTOR = None,
     shapes: SHAPES = None,
     host: HOST = "127.0.0.1",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, TARGET, file_option
+from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, option
 from facert.data.text import plural
 from facert.settings import LimitRule
 
@@ -18,41 +18,35 @@ if TYPE_CHECKING:
 
 
 def command(
-    source: Annotated[
-        Path, typer.Argument(metavar="IN", help="A take: markers or weights, some frames posed.")
-    ],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="Result: .h5, .csv.")],
-    keys: Annotated[
-        str, typer.Option(help="Key frames, as in 0,12,30; by default all that are posed.")
-    ] = "",
+    source: Annotated[Path, argument("IN", "A take: markers or weights, some frames posed.")],
+    output: Annotated[Path, argument("OUT", "Result: .h5, .csv.")],
+    keys: Annotated[str, option("Key frames, as in 0,12,30; by default all that are posed.")] = "",
     every: Annotated[
-        int | None, typer.Option(min=1, help="Instead: every so many frames, and the last.")
+        int | None, option("Instead: every so many frames, and the last.", min=1)
     ] = None,
     positions: Annotated[
         Path | None,
         file_option(
-            "--positions",
-            "The character's feature points: its markers in the key frames, instead of poses.",
+            "The character's feature points: its markers in the key frames, instead of poses."
         ),
     ] = None,
     method: Annotated[
         str,
-        typer.Option(
-            help="residual, path, framework (the paper's), literal (as printed), laplacian, "
+        option(
+            "residual, path, framework (the paper's), literal (as printed), laplacian, "
             "rbf-linear, rbf-thin-plate, ridge, affine or spline."
         ),
     ] = "residual",
     window: Annotated[
-        int | None, typer.Option(help="Frames of a window of time, odd.", show_default="9 or 15")
+        int | None, option("Frames of a window of time, odd.", show_default="9 or 15")
     ] = None,
     dim: Annotated[
-        int | None,
-        typer.Option(min=1, help="Directions of motion in a window.", show_default="5 or 3"),
+        int | None, option("Directions of motion in a window.", min=1, show_default="5 or 3")
     ] = None,
     limits: Annotated[
         LimitRule,
-        typer.Option(
-            help="Clip poses to: auto (declared, else the range of the key poses and old "
+        option(
+            "Clip poses to: auto (declared, else the range of the key poses and old "
             "animation), declared, or none, which keeps what goes beyond."
         ),
     ] = "auto",

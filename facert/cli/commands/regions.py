@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from facert.cli.shared.options import TARGET
+from facert.cli.shared.options import TARGET, argument
 from facert.errors import reading
 
 
 def command(
-    take: Annotated[Path, typer.Argument(metavar="TAKE", help="Take with poses in some frames.")],
+    take: Annotated[Path, argument("TAKE", "Take with poses in some frames.")],
     target: TARGET = None,
 ) -> None:
     """Find regions of markers and controls, and print them as TOML.

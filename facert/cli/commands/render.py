@@ -10,7 +10,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import PICTURES, require_name, save_picture
-from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, file_option
+from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, argument, file_option, option
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -24,27 +24,22 @@ MOST = 6
 
 
 def command(
-    path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A take with poses, or a mesh sequence.")
-    ],
-    output: Annotated[
-        Path,
-        typer.Argument(metavar="OUT", help="A sheet (.png, .pdf, .svg) or a clip (.mp4, .gif)."),
-    ],
+    path: Annotated[Path, argument("FILE", "A take with poses, or a mesh sequence.")],
+    output: Annotated[Path, argument("OUT", "A sheet (.png, .pdf, .svg) or a clip (.mp4, .gif).")],
     rig_path: RIG = None,
     truth_path: Annotated[
-        Path | None, file_option("--truth", "The true poses, or the true mesh sequence.")
+        Path | None, file_option("The true poses, or the true mesh sequence.", "--truth")
     ] = None,
     beside: Annotated[
         list[Path] | None,
-        file_option("--beside", "Another face of the same frames; again for more.", metavar="FILE"),
+        file_option("Another face of the same frames; again for more.", metavar="FILE"),
     ] = None,
     frames: Annotated[
-        str, typer.Option(help="For instance 0,30,60 for a sheet; 100..400 for a part of the take.")
+        str, option("For instance 0,30,60 for a sheet; 100..400 for a part of the take.")
     ] = "",
-    size: Annotated[int, typer.Option(min=64, max=2048, help="Pixels of a face a side.")] = 320,
+    size: Annotated[int, option("Pixels of a face a side.", min=64, max=2048)] = 320,
     fps: Annotated[
-        float | None, typer.Option(min=1, max=120, help="Of a clip; by default 30, GIF 20.")
+        float | None, option("Of a clip; by default 30, GIF 20.", min=1, max=120)
     ] = None,
     target: TARGET = None,
     shapes: SHAPES = None,

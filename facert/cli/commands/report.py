@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_text
-from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH
+from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH, argument, option
 from facert.data.text import plural
 
 ENDINGS = (".html", ".htm")
@@ -18,16 +16,14 @@ ENDINGS = (".html", ".htm")
 def command(
     results: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RESULT...", help="What eval --json or retarget wrote, or a folder of these."
-        ),
+        argument("RESULT...", "What eval --json or retarget wrote, or a folder of these."),
     ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="The page.", metavar="PAGE.html")
-    ] = Path("report.html"),
+    output: Annotated[Path, option("The page.", "--output", "-o", metavar="PAGE.html")] = Path(
+        "report.html"
+    ),
     rig_path: RIG = None,
     truth_path: TRUTH = None,
-    title: Annotated[str, typer.Option(help="Stands above all.")] = "",
+    title: Annotated[str, option("Stands above all.")] = "",
     shapes: SHAPES = None,
     target: TARGET = None,
     overwrite: OVERWRITE = False,

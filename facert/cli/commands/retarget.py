@@ -7,8 +7,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan
 from facert.cli.shared.options import (
@@ -24,7 +22,9 @@ from facert.cli.shared.options import (
     OVERWRITE,
     SIGMA,
     TARGET,
+    argument,
     chosen_options,
+    option,
 )
 from facert.data.text import plural
 from facert.errors import reading
@@ -40,22 +40,22 @@ if TYPE_CHECKING:
 def command(
     paths: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="IN OUT",
-            help="Take to retarget, and result: .h5, .csv, .json, or .livelink.csv for ARKit "
+        argument(
+            "IN OUT",
+            "Take to retarget, and result: .h5, .csv, .json, or .livelink.csv for ARKit "
             "controls. With --out-dir: any number of takes, or folders of takes.",
         ),
     ],
     model: MODEL = DEFAULT_MODEL,
     mode: Annotated[
-        Mode, typer.Option(help="All frames at once, or one after the other as in a live stream.")
+        Mode, option("All frames at once, or one after the other as in a live stream.")
     ] = "offline",
     neutral: Annotated[
         str | None,
-        typer.Option(
-            metavar="FRAMES",
-            help="Frames in which the actor rests, as 12 or 0..20: takes out what differs there "
+        option(
+            "Frames in which the actor rests, as 12 or 0..20: takes out what differs there "
             "from the training take.",
+            metavar="FRAMES",
         ),
     ] = None,
     controls: CONTROLS = None,

@@ -8,29 +8,23 @@ from typing import Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SEED, SHAPES
+from facert.cli.shared.options import OVERWRITE, SEED, SHAPES, argument, option
 from facert.data.text import plural
 
 
 def command(
-    rig: Annotated[
-        Path, typer.Argument(metavar="RIG", help="The actor: a rig file, .npz or folder of .obj.")
-    ],
-    weights: Annotated[
-        Path,
-        typer.Argument(metavar="WEIGHTS", help="Recorded weights, e.g. a Live Link Face .csv."),
-    ],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="The take to write, .h5 or .csv.")],
-    markers: Annotated[int, typer.Option(min=1, help="How many vertices serve as markers.")] = 40,
+    rig: Annotated[Path, argument("RIG", "The actor: a rig file, .npz or folder of .obj.")],
+    weights: Annotated[Path, argument("WEIGHTS", "Recorded weights, e.g. a Live Link Face .csv.")],
+    output: Annotated[Path, argument("OUT", "The take to write, .h5 or .csv.")],
+    markers: Annotated[int, option("How many vertices serve as markers.", min=1)] = 40,
     vertices: Annotated[
-        str | None, typer.Option(metavar="I,J,...", help="These vertices instead, counted from 0.")
+        str | None, option("These vertices instead, counted from 0.", metavar="I,J,...")
     ] = None,
     noise: Annotated[
-        float,
-        typer.Option(min=0.0, help="Share of the largest standard deviation of a coordinate."),
+        float, option("Share of the largest standard deviation of a coordinate.", min=0.0)
     ] = 0.0,
     missing: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Share of the markers' positions to hide.")
+        float, option("Share of the markers' positions to hide.", min=0.0, max=1.0)
     ] = 0.0,
     shapes: SHAPES = None,
     seed: SEED = 0,

@@ -9,7 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import read_observed, require_other_file, write_beside
-from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET, file_option
+from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET, argument, file_option, option
 from facert.data.text import plural
 from facert.errors import InputError, reading
 
@@ -19,27 +19,22 @@ if TYPE_CHECKING:
 
 
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Take with head motion.")],
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Result: .h5, with the motion, or .csv.")
-    ],
+    source: Annotated[Path, argument("IN", "Take with head motion.")],
+    output: Annotated[Path, argument("OUT", "Result: .h5, with the motion, or .csv.")],
     stable: Annotated[
         str,
-        typer.Option(
-            metavar="NAME,NAME,...",
-            help="Markers that hardly move against the skull, three at least; or find those "
+        option(
+            "Markers that hardly move against the skull, three at least; or find those "
             "whose distances to each other change least.",
+            metavar="NAME,NAME,...",
         ),
     ] = "automatic",
     reference: Annotated[
-        str,
-        typer.Option(metavar="FRAME|mean", help="Frame whose head pose all get, counted from 0."),
+        str, option("Frame whose head pose all get, counted from 0.", metavar="FRAME|mean")
     ] = "mean",
     like: Annotated[
         Path | None,
-        file_option(
-            "--like", "A take of the same actor that was stabilised before, for the same head pose."
-        ),
+        file_option("A take of the same actor that was stabilised before, for the same head pose."),
     ] = None,
     no_detect: NO_DETECT = False,
     target: TARGET = None,

@@ -10,7 +10,16 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
-from facert.cli.shared.options import AS_JSON, OVERWRITE, SEED, SHAPES, TARGET, file_option
+from facert.cli.shared.options import (
+    AS_JSON,
+    OVERWRITE,
+    SEED,
+    SHAPES,
+    TARGET,
+    argument,
+    file_option,
+    option,
+)
 from facert.data.text import plural
 
 if TYPE_CHECKING:
@@ -23,21 +32,21 @@ LABELS = "labels"
 
 
 def command(
-    take_path: Annotated[Path, typer.Argument(metavar="TAKE", help="What was recorded.")],
-    count: Annotated[int, typer.Option("-n", min=1, max=1000, help="How many frames.")] = 10,
+    take_path: Annotated[Path, argument("TAKE", "What was recorded.")],
+    count: Annotated[int, option("How many frames.", "-n", min=1, max=1000)] = 10,
     have: Annotated[
         str,
-        typer.Option(
+        option(
+            "Go on from the take's posed frames, or from a model that is trained already.",
             metavar="labels|MODEL",
-            help="Go on from the take's posed frames, or from a model that is trained already.",
         ),
     ] = "",
     seed: SEED = 0,
     sheet: Annotated[
-        Path | None, file_option("--sheet", "A contact sheet of the frames.", metavar="PNG")
+        Path | None, file_option("A contact sheet of the frames.", metavar="PNG")
     ] = None,
     rig_path: Annotated[
-        Path | None, file_option("--rig", "The actor's rig, to draw tracked weights.")
+        Path | None, file_option("The actor's rig, to draw tracked weights.", "--rig")
     ] = None,
     target: TARGET = None,
     shapes: SHAPES = None,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, TARGET
+from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, TARGET, argument, option
 from facert.errors import InputError, OutputExistsError, reading
 from facert.methods.registry import REGISTRY
 from facert.settings import (
@@ -64,43 +64,30 @@ def _option(name: str) -> inspect.Parameter:
 def command(
     take: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="TAKE", help="Take with poses in some frames; by default the built-in one."
-        ),
+        argument("TAKE", "Take with poses in some frames; by default the built-in one."),
     ] = None,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Model file to write.")
-    ] = DEFAULT_MODEL,
+    output: Annotated[Path, option("Model file to write.", "--output", "-o")] = DEFAULT_MODEL,
     predicted: Annotated[
-        bool,
-        typer.Option("--allow-predicted", help="Learn from poses that a model predicted as well."),
+        bool, option("Learn from poses that a model predicted as well.", "--allow-predicted")
     ] = False,
     config: Annotated[
         Path | None,
-        typer.Option(
-            metavar="TOML", help="File with any of the settings; options given here come first."
-        ),
+        option("File with any of the settings; options given here come first.", metavar="TOML"),
     ] = None,
     resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Continue a shared model from its checkpoint.", rich_help_panel=SHARED
-        ),
+        bool, option("Continue a shared model from its checkpoint.", "--resume", panel=SHARED)
     ] = False,
     start: Annotated[
         Path | None,
-        typer.Option(
-            metavar="MODEL",
-            help="Begin at a trained shared model, as after another frame was posed; its settings "
+        option(
+            "Begin at a trained shared model, as after another frame was posed; its settings "
             "are the defaults.",
-            rich_help_panel=SHARED,
+            metavar="MODEL",
+            panel=SHARED,
         ),
     ] = None,
     curve: Annotated[
-        Path | None,
-        typer.Option(
-            "--log", metavar="CSV", help="File for the training curve.", rich_help_panel=SHARED
-        ),
+        Path | None, option("File for the training curve.", "--log", metavar="CSV", panel=SHARED)
     ] = None,
     target: TARGET = None,
     overwrite: OVERWRITE = False,

@@ -5,11 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.interrupt import interruptible
-from facert.cli.shared.options import ACTOR, HOST, PORT, RIG, SHAPES, TARGET, TRUTH
+from facert.cli.shared.options import (
+    ACTOR,
+    HOST,
+    PORT,
+    RIG,
+    SHAPES,
+    TARGET,
+    TRUTH,
+    argument,
+    option,
+)
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
@@ -21,11 +29,11 @@ if TYPE_CHECKING:
 
 
 def command(
-    path: Annotated[Path, typer.Argument(metavar="TAKE", help="A take, or what retarget wrote.")],
+    path: Annotated[Path, argument("TAKE", "A take, or what retarget wrote.")],
     rig_path: RIG = None,
     truth_path: TRUTH = None,
     model: Annotated[
-        Path | None, typer.Option("--model", "-m", help="Retarget TAKE with this model first.")
+        Path | None, option("Retarget TAKE with this model first.", "--model", "-m")
     ] = None,
     actor_path: ACTOR = None,
     target: TARGET = None,

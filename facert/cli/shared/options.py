@@ -15,74 +15,79 @@ if TYPE_CHECKING:
 
 DEFAULT_MODEL = Path("model.safetensors")
 
-MODEL = Annotated[Path, typer.Option("--model", "-m", help="Model file that train wrote.")]
-SEED = Annotated[int, typer.Option("--seed", min=0, help="For every random choice.")]
-AS_JSON = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+
+def option(text: str, *names: str, panel: str | None = None, **more: Any) -> Any:
+    """An option by its help, and its names where they are not those of the parameter."""
+    return typer.Option(*names, help=text, rich_help_panel=panel, **more)
+
+
+def file_option(text: str, *names: str, **more: Any) -> Any:
+    """An option in the panel of files."""
+    return option(text, *names, panel=FILES, **more)
+
+
+def argument(name: str, text: str = "", **more: Any) -> Any:
+    """An argument by its name in the help."""
+    return typer.Argument(metavar=name, help=text, **more)
+
+
+MODEL = Annotated[Path, option("Model file that train wrote.", "--model", "-m")]
+SEED = Annotated[int, option("For every random choice.", "--seed", min=0)]
+AS_JSON = Annotated[bool, option("Print JSON, for programs.", "--json")]
 NO_DETECT = Annotated[
-    bool, typer.Option("--no-detect", help="Take every marker as observed, even what looks bad.")
+    bool, option("Take every marker as observed, even what looks bad.", "--no-detect")
 ]
-NO_SMOOTH = Annotated[bool, typer.Option("--no-smooth", help="Map every frame as it was measured.")]
+NO_SMOOTH = Annotated[bool, option("Map every frame as it was measured.", "--no-smooth")]
 SIGMA = Annotated[
     float | None,
-    typer.Option(
-        min=0.0, help="Standard deviation of the capture noise in the take's units; else estimated."
-    ),
+    option("Standard deviation of the capture noise in the take's units; else estimated.", min=0.0),
 ]
 DEVICE = Annotated[
     str,
-    typer.Option(
-        "--device", help="Where the shared models compute: cpu or cuda; all others stay on the CPU."
-    ),
+    option("Where the shared models compute: cpu or cuda; all others stay on the CPU.", "--device"),
 ]
-HOST = Annotated[
-    str, typer.Option("--host", help="Address of the page; 0.0.0.0 for other machines as well.")
-]
-PORT = Annotated[int, typer.Option("--port", help="Port of the page, or the next free one.")]
-
-
-def file_option(name: str, text: str, *names: str, **more: Any) -> Any:
-    """An option in the panel of files."""
-    return typer.Option(name, *names, help=text, rich_help_panel=FILES, **more)
+HOST = Annotated[str, option("Address of the page; 0.0.0.0 for other machines as well.", "--host")]
+PORT = Annotated[int, option("Port of the page, or the next free one.", "--port")]
 
 
 TARGET = Annotated[
     str | None,
-    file_option("--target", "Which target of an .npz take that has several.", metavar="KEY"),
+    file_option("Which target of an .npz take that has several.", "--target", metavar="KEY"),
 ]
 SHAPES = Annotated[
     str | None,
-    file_option("--shapes", "Which of several sets of shapes of an .npz rig.", metavar="KEY"),
+    file_option("Which of several sets of shapes of an .npz rig.", "--shapes", metavar="KEY"),
 ]
-RIG = Annotated[Path | None, file_option("--rig", "The character's rig.")]
-TRUTH = Annotated[Path | None, file_option("--truth", "The true poses of the same frames.")]
-ACTOR = Annotated[Path | None, file_option("--actor", "The actor's rig, to draw tracked weights.")]
+RIG = Annotated[Path | None, file_option("The character's rig.", "--rig")]
+TRUTH = Annotated[Path | None, file_option("The true poses of the same frames.", "--truth")]
+ACTOR = Annotated[Path | None, file_option("The actor's rig, to draw tracked weights.", "--actor")]
 CONTROLS = Annotated[
     Path | None,
-    file_option("--controls", "Gain, limits and smoothing of single controls.", metavar="TOML"),
+    file_option("Gain, limits and smoothing of single controls.", "--controls", metavar="TOML"),
 ]
 OUT_DIR = Annotated[
     Path | None,
     file_option(
-        "--out-dir", "Folder for the results of several takes, named after them.", metavar="DIR"
+        "Folder for the results of several takes, named after them.", "--out-dir", metavar="DIR"
     ),
 ]
 ENDING = Annotated[
     str | None,
     file_option(
-        "--ending", "Of the files in --out-dir; their format goes by it.", show_default=".h5"
+        "Of the files in --out-dir; their format goes by it.", "--ending", show_default=".h5"
     ),
 ]
 JOBS = Annotated[
     int | None,
     file_option(
-        "--jobs",
         "Takes at a time in --out-dir; 0: one a processor core.",
+        "--jobs",
         "-j",
         min=0,
         show_default="1",
     ),
 ]
-OVERWRITE = Annotated[bool, file_option("--overwrite", "Replace existing output files.")]
+OVERWRITE = Annotated[bool, file_option("Replace existing output files.", "--overwrite")]
 
 
 def chosen_options(
