@@ -1,4 +1,4 @@
-"""One line that says which method to use for a take, and what more labels would bring."""
+"""One line of advice: which method to use for a take, and what more labels would bring."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Outcome:
     failure : str
         Why the method could not run; empty when it did.
     details : str
-        The traceback of a failure that nobody foresaw; empty for others.
+        The traceback of an unexpected failure; empty for others.
     """
 
     cell: Cell
@@ -80,14 +80,14 @@ class Outcome:
 def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:
     """Train and test a method on the draw of its cell, on one thread.
 
-    Whatever goes wrong is told in the outcome: one cell never ends an evaluation.
+    Whatever goes wrong is in the outcome: one cell never ends an evaluation.
 
     Parameters
     ----------
     problem : Problem
     cell : Cell
     settings : Settings
-        Everything about training that the cell does not say.
+        Everything about training that the cell leaves open.
     """
     with threads_for(1), _quiet():
         try:
@@ -138,7 +138,7 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Nothing in the log: what training has to say, it would say hundreds of times."""
+    """Nothing in the log: the notes of training would come hundreds of times."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:

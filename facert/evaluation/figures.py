@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK = "#3a3f47"
-# Okabe and Ito's colours, told apart by everybody, and three more; markers help in print.
+# Okabe and Ito's colours, which everybody can distinguish, and three more; markers help in print.
 COLOURS = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a6f00", "#000000"),
     *("#8c564b", "#8a8a8a", "#7048c0"),

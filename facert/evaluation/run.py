@@ -71,7 +71,7 @@ def run(
         Processes; 1 stays in this one. The outcomes do not depend on it, apart from the times.
     journal : Journal, optional
         Cells that it holds are not evaluated again; others are added to it, but for those that
-        failed in a way that nobody foresaw: the next run tries them again.
+        failed unexpectedly: the next run tries them again.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def _table(title: str, facts: Mapping[str, Any]) -> Table:
 
 
 def _lines(facts: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Label and text of every fact that says something, parts below their whole."""
+    """Label and text of every fact that is not empty, parts below their whole."""
     for key, value in facts.items():
         label = prefix + key.replace("_", " ")
         if isinstance(value, Mapping):

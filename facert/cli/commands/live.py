@@ -7,8 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -25,7 +23,7 @@ from facert.cli.shared.options import (
     OVERWRITE,
     SIGMA,
     TARGET,
-    chosen_options,
+    MappingOptions,
     file_option,
     option,
 )
@@ -113,7 +111,7 @@ def command(
     file = ModelFile(model)
     retargeter = file.load()
     with ExitStack() as stack:
-        receiver = _open_receiver(begin, listen, _Played(speed, target), retargeter)
+        receiver = _open_receiver(begin, listen, retargeter, speed, target)
         stack.callback(receiver.close)
         controls, pattern = retargeter.controls, receiver.pattern
         recordings = Recordings(pattern, retargeter.source_names, controls, overwrite)
@@ -122,13 +120,7 @@ def command(
         files = [recordings.poses(end.path) for end in ends if isinstance(end, File)]
         senders = _open_senders(stack, ends, controls.names, receiver)
         with reading(source):
-            options = partial(
-                chosen_options,
-                controls=controls_path,
-                no_detect=no_detect,
-                no_smooth=no_smooth,
-                sigma=sigma,
-            )
+            options = MappingOptions(controls_path, no_detect, no_smooth, sigma)
             mapper = LiveModel(file, retargeter, pattern, receiver.fps, options, neutral)
             stack.enter_context(mapper)
         session = LiveSession(receiver, mapper, senders, files, kept)
@@ -148,14 +140,6 @@ def command(
     print_summary(session, written, as_json)
 
 
-@dataclass(frozen=True)
-class _Played:
-    """How a take is played."""
-
-    speed: float
-    target: str | None
-
-
 def _parsed(parse: Callable[[str], _Parsed], text: str) -> _Parsed:
     try:
         return parse(text)
@@ -164,7 +148,7 @@ def _parsed(parse: Callable[[str], _Parsed], text: str) -> _Parsed:
 
 
 def _open_receiver(
-    begin: Address | File, listen: str, played: _Played, retargeter: Retargeter
+    begin: Address | File, listen: str, retargeter: Retargeter, speed: float, target: str | None
 ) -> Receiver:
     from facert.io.formats import read_take_file
     from facert.live.endpoints import File, open_receiver
@@ -172,7 +156,7 @@ def _open_receiver(
     from facert.live.receivers import TakeReceiver
 
     if isinstance(begin, File):
-        return TakeReceiver(read_take_file(begin.path, played.target), played.speed)
+        return TakeReceiver(read_take_file(begin.path, target), speed)
     wanted = frame_pattern(retargeter.source_names, retargeter.source_kind, retargeter.units)
     return open_receiver(begin, listen, wanted)
 

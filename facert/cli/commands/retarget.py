@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -22,8 +21,8 @@ from facert.cli.shared.options import (
     OVERWRITE,
     SIGMA,
     TARGET,
+    MappingOptions,
     argument,
-    chosen_options,
     option,
 )
 from facert.data.text import plural
@@ -33,7 +32,6 @@ Mode = Literal["offline", "online"]
 
 if TYPE_CHECKING:
     from facert.data.take import Take
-    from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
 
@@ -75,14 +73,7 @@ def command(
     facert retarget facert-demo/training.h5 --out-dir results --ending .csv
     """
     todo = plan(paths, out_dir, ending, jobs, overwrite)
-    options = partial(
-        chosen_options,
-        controls=controls,
-        no_detect=no_detect,
-        no_smooth=no_smooth,
-        sigma=sigma,
-        neutral=neutral,
-    )
+    options = MappingOptions(controls, no_detect, no_smooth, sigma, neutral)
     work = partial(
         _retarget,
         model=model,
@@ -101,7 +92,7 @@ def _retarget(
     *,
     model: Path,
     mode: Mode,
-    options: Callable[[Retargeter], RetargetOptions],
+    options: MappingOptions,
     target: str | None,
     device: str,
     overwrite: bool,

@@ -1,4 +1,4 @@
-"""What every command says and how: results on stdout, everything else on stderr."""
+"""The output of every command: results on stdout, everything else on stderr."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _StderrHandler(logging.Handler):
 
 
 FIGURES = {"seconds": "training seconds"}
-"""Figures of a model whose name alone says too little."""
+"""Better names for figures of a model."""
 
 
 def show(text: str) -> None:

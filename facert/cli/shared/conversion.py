@@ -84,9 +84,8 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
 
 def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: bool) -> str:
     if changes != Changes():
-        raise InputError(
-            "options", "none that change a take", "a mesh sequence", "Leave them out.", str(source)
-        )
+        expected, found = "none that change a take", "a mesh sequence"
+        raise InputError("options", expected, found, "Leave them out.", str(source))
     require_output(output, overwrite, "morphs")
     with open_mesh_sequence(source) as sequence:
         morphs = compact_morphs(sequence)
@@ -99,7 +98,7 @@ def _motion(take: Take, wanted: Wanted, changes: Changes) -> Morphs:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
     with reading(wanted.rig):
         rig = formats.read_rig_file(wanted.rig, wanted.shapes)
-        # What IN holds, `--in-units`, says nothing of a rig that knows its own unit; and the axis
+        # What IN holds, `--in-units`, is not that of a rig which states its own unit; and the axis
         # that is up is the rig's own.
         stated = rig.units or changes.in_units
         in_unit = in_space(rig, Changes(in_units=stated, units=changes.units))

@@ -9,7 +9,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import typer
@@ -44,12 +43,7 @@ class Status:
             self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._on_terminal:
             self._live.stop()
 
@@ -75,7 +69,7 @@ class Status:
 
 
 def print_summary(session: LiveSession, written: Sequence[Path], as_json: bool) -> None:
-    """Say what happened, on stdout."""
+    """Print what happened, on stdout."""
     pace = session.meter.pace()
     if as_json:
         typer.echo(json.dumps(_facts(session.counters, pace, written), indent=2))
@@ -93,7 +87,7 @@ def _pace(pace: Pace) -> str:
 
 
 def _counts(counters: Counters) -> str:
-    """The counters: those that every session has, and others when there is something to say."""
+    """The counters: those that every session has, and others that are not 0."""
     always = f"{counters.mapped} mapped, {counters.dropped} dropped, {counters.bad} bad"
     others = {
         "late or double": counters.late,

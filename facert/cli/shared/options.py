@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -90,31 +91,33 @@ JOBS = Annotated[
 OVERWRITE = Annotated[bool, file_option("Replace existing output files.", "--overwrite")]
 
 
-def chosen_options(
-    retargeter: Retargeter,
-    *,
-    controls: Path | None,
-    no_detect: bool,
-    no_smooth: bool,
-    sigma: float | None = None,
-    neutral: str | None = None,
-) -> RetargetOptions:
-    """What the options ask for, of a take that goes through this model."""
-    from facert.data.ranges import parse_frames
-    from facert.errors import reading
-    from facert.io.toml import read_toml
-    from facert.retarget.options import Adjustments, RetargetOptions
+@dataclass(frozen=True)
+class MappingOptions:
+    """What the options of a command ask for, of takes that go through a model."""
 
-    adjustments = None
-    if controls is not None:
-        with reading(controls):
-            adjustments = Adjustments.of(
-                read_toml(controls, '["jaw*"] gain = 1.2'), retargeter.controls.names
-            )
-    return RetargetOptions(
-        detect=not no_detect,
-        smooth=not no_smooth,
-        sigma=sigma,
-        neutral=None if neutral is None else parse_frames(neutral, "--neutral"),
-        adjustments=adjustments,
-    )
+    controls: Path | None
+    no_detect: bool
+    no_smooth: bool
+    sigma: float | None
+    neutral: str | None = None
+
+    def __call__(self, retargeter: Retargeter) -> RetargetOptions:
+        """The same for this model."""
+        from facert.data.ranges import parse_frames
+        from facert.errors import reading
+        from facert.io.toml import read_toml
+        from facert.retarget.options import Adjustments, RetargetOptions
+
+        adjustments = None
+        if self.controls is not None:
+            with reading(self.controls):
+                table = read_toml(self.controls, '["jaw*"] gain = 1.2')
+                adjustments = Adjustments.of(table, retargeter.controls.names)
+        neutral = None if self.neutral is None else parse_frames(self.neutral, "--neutral")
+        return RetargetOptions(
+            detect=not self.no_detect,
+            smooth=not self.no_smooth,
+            sigma=self.sigma,
+            neutral=neutral,
+            adjustments=adjustments,
+        )

@@ -37,10 +37,10 @@ def _parts(found: Sequence[Comparison]) -> tuple[str, ...]:
 
 
 def _cells(comparison: Comparison, parts: tuple[str, ...]) -> tuple[str, ...]:
-    told = {group.name: f"{group.rms:.4f}" for group in comparison.groups}
-    told[ALL] = f"{comparison.rms:.4f}"
+    errors = {group.name: f"{group.rms:.4f}" for group in comparison.groups}
+    errors[ALL] = f"{comparison.rms:.4f}"
     counts = str(comparison.frames), str(comparison.controls)
-    return *counts, *(told.get(part, "") for part in parts)
+    return *counts, *(errors.get(part, "") for part in parts)
 
 
 def _warning(found: Sequence[Comparison]) -> str:

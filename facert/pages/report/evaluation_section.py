@@ -17,7 +17,7 @@ from facert.evaluation.figures import INK, plot_errors
 from facert.evaluation.table import EvaluationRow, columns_of, sections_of
 from facert.io.guarded import existing_file, read_text
 from facert.pages.report.embedding import embedded
-from facert.pages.report.sections import Fact, Picture, Section, Table
+from facert.pages.report.sections import Picture, Section, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +62,7 @@ def _section(name: str, settings: Mapping[str, Any], rows: list[EvaluationRow]) 
     versions = settings.get("versions")
     if isinstance(versions, Mapping):
         known |= versions
-    facts = tuple(Fact(str(key), _text(value)) for key, value in known.items())
+    facts = {str(key): _text(value) for key, value in known.items()}
     failures = sorted({f"{row.method}: {row.failure}" for row in rows if row.failure})
     title, text = f"Evaluation: {name}", " ".join(failures)
     return Section(title, text, tuple(pictures), tuple(_tables(rows)), facts)

@@ -22,7 +22,7 @@ from facert.io.registry import OWN_ENDINGS
 from facert.io.rig import read_rig
 from facert.pages.report.evaluation_section import read_evaluation
 from facert.pages.report.performance_section import fits, performance_section, truth_among
-from facert.pages.report.sections import Fact, Section
+from facert.pages.report.sections import Section
 
 log = logging.getLogger("facert")
 
@@ -61,15 +61,21 @@ def folder_sections(
     InputError
         When there is nothing to report.
     """
-    rigs = [rig] if rig is not None else list(_read(_of_format(folder, RIG_FORMAT), read_rig))
+    own = {path: _stated(path) for path in _files(folder, *OWN_ENDINGS)}
+    rigs = [path for path, form in own.items() if form == RIG_FORMAT] if rig is None else []
     documents = {path: _is_evaluation(path) for path in _files(folder, ".json")}
     evaluations = [path for path, is_one in documents.items() if is_one]
-    takes = dict(_takes(folder, [path for path, is_one in documents.items() if not is_one]))
-    models = _files(folder, ".safetensors")
+    curves = [path for path, is_one in documents.items() if not is_one]
+    # Curves beside a take of the same name are of that take.
+    stems = {path.stem for path in own}
+    takes = [path for path, form in own.items() if form == TAKE_FORMAT]
+    curves += _files(folder, ".csv")
+    takes += [path for path in curves if path.stem.removesuffix(".livelink") not in stems]
+    known = [rig] if rig is not None else list(_read(rigs, read_rig).values())
     sections = (
-        *_read(evaluations, read_evaluation),
-        *_performances(takes, rigs, truth),
-        *_read(models, _model),
+        *_read(evaluations, read_evaluation).values(),
+        *_performances(_read(takes, read_performance), known, truth),
+        *_read(_files(folder, ".safetensors"), _model).values(),
     )
     if not sections:
         expected = "what eval --json or retarget wrote, or models"
@@ -117,21 +123,17 @@ def _is_result(path: Path, take: Take) -> bool:
 
 
 def _model(path: Path) -> Section:
-    """What a model says of itself."""
+    """The settings and figures of a model."""
     facts = facert.load(path).facts
     names = facts["source_names"]
-    told: dict[str, Any] = {
+    shown: dict[str, Any] = {
         "source": plural(len(names), facts["source_kind"][:-1]),
         "controls": ", ".join(facts["target_names"]),
         **{name: value for name, value in facts["settings"].items() if value is not None},
         **facts["figures"],
     }
-    shown = tuple(Fact(str(name), _told(value)) for name, value in told.items())
-    return Section(f"Model: {path.name}", facts=shown)
-
-
-def _told(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    texts = {n: f"{v:.4g}" if isinstance(v, float) else str(v) for n, v in shown.items()}
+    return Section(f"Model: {path.name}", facts=texts)
 
 
 def _is_evaluation(path: Path) -> bool:
@@ -144,21 +146,6 @@ def _is_evaluation(path: Path) -> bool:
         return True
 
 
-def _takes(folder: Path, curves: list[Path]) -> Iterator[tuple[Path, Take]]:
-    """Takes, and what columns tell that no take of the same name does."""
-    for path in _of_format(folder, TAKE_FORMAT):
-        yield from ((path, take) for take in _read([path], read_performance))
-    stems = {path.stem for path in _files(folder, *OWN_ENDINGS)}
-    for path in [*curves, *_files(folder, ".csv")]:
-        if path.stem.removesuffix(".livelink") not in stems:
-            yield from ((path, take) for take in _read([path], read_performance))
-
-
-def _of_format(folder: Path, form: str) -> list[Path]:
-    """HDF5 files of a folder that say that they are of a format."""
-    return [path for path in _files(folder, *OWN_ENDINGS) if _stated(path) == form]
-
-
 def _files(folder: Path, *endings: str) -> list[Path]:
     """The first files with such an ending, by name."""
     found = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings]
@@ -168,16 +155,19 @@ def _files(folder: Path, *endings: str) -> list[Path]:
 
 
 def _stated(path: Path) -> str:
+    """The format that an HDF5 file states."""
     try:
         return stated_format(path)
     except InputError:
         return ""
 
 
-def _read(paths: list[Path], read: Callable[[Path], Thing]) -> Iterator[Thing]:
-    """Read files one after the other; those that cannot be read are named and passed over."""
+def _read(paths: list[Path], read: Callable[[Path], Thing]) -> dict[Path, Thing]:
+    """What is in some files; those that cannot be read are named and passed over."""
+    found = {}
     for path in paths:
         try:
-            yield read(path)
+            found[path] = read(path)
         except InputError as error:
             log.warning("passed over: %s", error)
+    return found

@@ -9,20 +9,20 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined, Template
 
 from facert.pages.report.comparison_section import comparison_section
-from facert.pages.report.sections import Fact, Report, Section
+from facert.pages.report.sections import ReportPage, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
 
 
-def make_report(title: str, sections: tuple[Section, ...]) -> Report:
-    """A report that says what made it; several results with a truth are compared first."""
+def make_report(title: str, sections: tuple[Section, ...]) -> ReportPage:
+    """A report with what made it; several results with a truth are compared first."""
     comparison = comparison_section(sections)
     if comparison is not None:
         sections = (comparison, *sections)
-    return Report(title, sections, tuple(Fact(name, version(name)) for name in LIBRARIES))
+    return ReportPage(title, sections, {name: version(name) for name in LIBRARIES})
 
 
-def to_html(report: Report) -> str:
+def to_html(report: ReportPage) -> str:
     """The page; the same report gives the same text. All that came from files is escaped."""
     return _template().render(report=report)
 

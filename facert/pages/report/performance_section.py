@@ -11,7 +11,7 @@ from facert.data.take import Take
 from facert.data.text import plural
 from facert.evaluation.metrics import Comparison, compare
 from facert.pages.report.embedding import embedded
-from facert.pages.report.sections import Fact, Picture, Section, Table
+from facert.pages.report.sections import Picture, Section, Table
 from facert.render.faces import choose_frames, drives, posed_face, require_poses
 from facert.render.plots import plot_controls
 from facert.render.sheet import render_sheet
@@ -23,17 +23,9 @@ PIXELS = 240  # a face a side: a page shows six beside each other
 def performance_section(
     name: str, take: Take, rig: Rig | None = None, truth: Take | None = None
 ) -> Section:
-    """What there is to see of a take.
+    """Pictures and facts of a take with poses; with the character's rig its faces as well.
 
-    Parameters
-    ----------
-    name : str
-    take : Take
-        With poses.
-    rig : Rig, optional
-        The character.
-    truth : Take, optional
-        True poses of the same frames.
+    With a `truth`, the true poses of the same frames, there are errors by part of the face.
 
     Raises
     ------
@@ -51,7 +43,7 @@ def performance_section(
         pictures.append(embedded(sheet, "Frames that differ well", "png"))
     curves = plot_controls(take) if shared is None else plot_controls(shared.result, shared.truth)
     pictures.append(embedded(curves, "The controls that vary most", "svg"))
-    section = Section(f"Performance: {name}", "", tuple(pictures), (), _facts(take, rig))
+    section = Section(f"Performance: {name}", "", tuple(pictures), facts=_facts(take, rig))
     return section if shared is None else _with_errors(section, shared)
 
 
@@ -65,18 +57,15 @@ def truth_among(known: Sequence[Take], take: Take) -> Take | None:
 
     Of several, the one that shares most of its controls; it is none that shares less than half.
     """
-    whole = [
-        truth
-        for truth in known
-        if truth.std is None and len(truth.labels) == len(truth) == len(take)
-    ]
-    found = [(truth, shared_controls(truth, take)) for truth in whole]
-    lacking = [
-        (len(shared.of_result), len(shared.of_truth), truth)
-        for truth, shared in found
-        if shared is not None and len(shared.of_result) <= len(shared.names)
-    ]
-    return min(lacking, key=lambda each: each[:2])[2] if lacking else None
+    best, least = None, None
+    for truth in known:
+        whole = truth.std is None and len(truth.labels) == len(truth) == len(take)
+        shared = shared_controls(truth, take) if whole else None
+        if shared is not None and len(shared.of_result) <= len(shared.names):
+            lacking = len(shared.of_result), len(shared.of_truth)
+            if least is None or lacking < least:
+                best, least = truth, lacking
+    return best
 
 
 def _with_errors(section: Section, shared: SharedControls) -> Section:
@@ -94,7 +83,7 @@ def _errors(comparison: Comparison) -> Table:
     return Table(caption, ("part", "controls", "RMS"), (*rows, whole), frozenset([len(rows)]))
 
 
-def _facts(take: Take, rig: Rig | None) -> tuple[Fact, ...]:
+def _facts(take: Take, rig: Rig | None) -> dict[str, str]:
     assert take.controls is not None  # poses come with controls
     source = plural(len(take.source.names), take.source.kind[:-1])
     facts = {
@@ -105,4 +94,4 @@ def _facts(take: Take, rig: Rig | None) -> tuple[Fact, ...]:
         "rig": "" if rig is None else f"{len(rig.neutral)} vertices, in {rig.units or 'no unit'}",
         "created by": take.created_by,
     }
-    return tuple(Fact(name, value) for name, value in facts.items() if value)
+    return {name: value for name, value in facts.items() if value}

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from facert.evaluation.metrics import Comparison
 
 
 @dataclass(frozen=True)
-class Fact:
-    """A name and its value."""
-
-    name: str
-    value: str
-
-
-@dataclass(frozen=True)
 class Table:
-    """Cells as text; the first column is left-aligned.
-
-    Parameters
-    ----------
-    caption : str
-    columns : tuple of str
-    rows : tuple of tuple of str
-    best : frozenset of int
-        Rows that stand out.
-    """
+    """Cells as text under their columns, the first one left-aligned; the `best` rows stand out."""
 
     caption: str
     columns: tuple[str, ...]
@@ -36,14 +20,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """An image that is part of the page.
-
-    Parameters
-    ----------
-    caption : str
-    uri : str
-        ``data:image/...``.
-    """
+    """An image that is part of the page, ``data:image/...``."""
 
     caption: str
     uri: str
@@ -51,38 +28,23 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """One result.
+    """One result: text, pictures, tables and facts by their names.
 
-    Parameters
-    ----------
-    title, text : str
-    pictures : tuple of Picture
-    tables : tuple of Table
-    facts : tuple of Fact
-    comparison : Comparison, optional
-        Of a performance with its truth; the page shows it beside those of the others.
+    The page shows the `comparison` of a performance with its truth beside those of the others.
     """
 
     title: str
     text: str = ""
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
-    facts: tuple[Fact, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
     comparison: Comparison | None = None
 
 
 @dataclass(frozen=True)
-class Report:
-    """A page.
-
-    Parameters
-    ----------
-    title : str
-    sections : tuple of Section
-    versions : tuple of Fact
-        Of the libraries that made the page.
-    """
+class ReportPage:
+    """A page, and the versions of the libraries that made it."""
 
     title: str
     sections: tuple[Section, ...]
-    versions: tuple[Fact, ...]
+    versions: Mapping[str, str]

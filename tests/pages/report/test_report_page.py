@@ -19,7 +19,7 @@ from facert.evaluation.table import EvaluationRow
 from facert.pages.report.evaluation_section import read_evaluation
 from facert.pages.report.page import make_report, to_html
 from facert.pages.report.performance_section import fits, performance_section, truth_among
-from facert.pages.report.sections import Fact, Section, Table
+from facert.pages.report.sections import Section, Table
 
 HOSTILE = '<script>alert("1")</script>'
 CONTROLS = ("$x", "</text><script>", "--><script>", "<img src=http://a.b/c>")
@@ -186,7 +186,7 @@ def test_what_is_empty_leaves_no_trace() -> None:
     assert "<figure" not in text
     assert "<dl>" not in text
     assert "<nav>" not in text
-    assert "<dl>" in to_html(make_report("a", (Section("b", facts=(Fact("c", "d"),)),)))
+    assert "<dl>" in to_html(make_report("a", (Section("b", facts={"c": "d"}),)))
 
 
 def test_several_results_are_compared_first_by_part_of_the_face(make_take) -> None:
