@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
 from facert.data.text import plural
 from facert.evaluation.cells import Outcome
-from facert.evaluation.metrics import Scores
+from facert.evaluation.paired import MeanWithError
 from facert.evaluation.protocol import Protocol
+
+MEASURES = ("rms_normalised", "jitter", "vertex_rms", "vertex_p95")
+"""The scores, besides the RMS, whose means are in a row."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def _row(outcomes: Sequence[Outcome], protocol: Protocol) -> EvaluationRow:
     cell = outcomes[0].cell
     ran = [outcome for outcome in outcomes if outcome.scores is not None]
     scores = [outcome.scores for outcome in ran if outcome.scores is not None]
-    errors = np.array([s.rms for s in scores])
+    error = MeanWithError.of(np.array([s.rms for s in scores])) if scores else None
     return EvaluationRow(
         method=cell.method,
         labels=cell.labels,
@@ -164,16 +166,13 @@ def _row(outcomes: Sequence[Outcome], protocol: Protocol) -> EvaluationRow:
         noise=protocol.noise,
         missing=protocol.missing,
         repeats=len(ran),
-        rms=_mean(errors),
-        rms_se=float(errors.std(ddof=1) / len(errors) ** 0.5) if len(errors) > 1 else None,
+        rms=error.value if error else None,
+        rms_se=error.se if error and len(scores) > 1 else None,
         ratio_to_best=None,
-        rms_normalised=_mean_of(scores, lambda s: s.rms_normalised),
-        jitter=_mean_of(scores, lambda s: s.jitter),
-        vertex_rms=_mean_of(scores, lambda s: s.vertex_rms),
-        vertex_p95=_mean_of(scores, lambda s: s.vertex_p95),
         per_control=tuple(np.mean([s.per_control for s in scores], axis=0)) if scores else (),
-        fit_seconds=_mean(np.array([outcome.fit_seconds for outcome in ran])),
-        frame_ms=_mean(np.array([outcome.frame_ms for outcome in ran])),
+        **{name: _mean(getattr(s, name) for s in scores) for name in MEASURES},
+        fit_seconds=_mean(outcome.fit_seconds for outcome in ran),
+        frame_ms=_mean(outcome.frame_ms for outcome in ran),
         failure=next((outcome.failure for outcome in outcomes if outcome.failure), ""),
     )
 
@@ -190,11 +189,7 @@ def _rank(row: EvaluationRow) -> tuple[int, int, bool, float, str]:
     return row.labels, row.unlabelled, bool(row.failure), error, row.method
 
 
-def _mean_of(scores: Sequence[Scores], measure: Callable[[Scores], float | None]) -> float | None:
+def _mean(values: Iterable[float | None]) -> float | None:
     """Over the repeats in which there was something to measure."""
-    values = [value for value in map(measure, scores) if value is not None]
-    return _mean(np.array(values))
-
-
-def _mean(values: FloatArray) -> float | None:
-    return float(values.mean()) if len(values) else None
+    measured = [value for value in values if value is not None]
+    return float(np.mean(measured)) if measured else None

@@ -13,7 +13,9 @@ from facert.cli.shared.options import OVERWRITE, argument, option
 
 
 def command(
-    program: Annotated[Literal["blender", "maya"], argument("blender|maya")],
+    program: Annotated[
+        Literal["blender", "maya"], argument("blender|maya", "The program that the script is for.")
+    ],
     output: Annotated[
         Path | None, option("Write it here instead of to stdout.", "--output", "-o")
     ] = None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, option
+from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, numbers, option
 from facert.data.text import plural
 from facert.settings import LimitRule
 
@@ -96,10 +96,7 @@ def _keys(keys: str, every: int | None, posed: IntArray, frames: int) -> list[in
     if every:
         return [int(key) for key in even_keys(frames, every)]
     if keys:
-        try:
-            return sorted({int(key) for key in keys.split(",")})
-        except ValueError:
-            raise typer.BadParameter("give frame numbers with commas, as in 0,12,30") from None
+        return sorted(set(numbers(keys, "--keys")))
     if len(posed) == frames:
         raise InputError(
             "--keys", "some frames", "a pose in all of them", "Choose with --keys or --every 10."

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from facert.cli.shared import console
-from facert.cli.shared.options import OVERWRITE, SEED, SHAPES, argument, option
+from facert.cli.shared.options import OVERWRITE, SEED, SHAPES, argument, numbers, option
 from facert.data.text import plural
 
 
@@ -43,7 +41,7 @@ def command(
     from facert.mesh.capture import simulate_capture
 
     require_output(output, overwrite, "take")
-    chosen = None if vertices is None else _indices(vertices)
+    chosen = None if vertices is None else numbers(vertices, "--vertices")
     actor, performance = read_rig_file(rig, shapes), read_source_file(weights)
     with reading(weights):
         take = simulate_capture(
@@ -59,10 +57,3 @@ def command(
     controls = 0 if take.controls is None else len(take.controls.names)
     markers_of = f"{plural(len(take), 'frame')} of {plural(len(take.source.names), 'marker')}"
     console.show(f"{output}: {markers_of}, {plural(controls, 'control')}")
-
-
-def _indices(text: str) -> list[int]:
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError as error:
-        raise typer.BadParameter("give numbers like 12,40,77", param_hint="--vertices") from error

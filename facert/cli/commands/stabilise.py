@@ -24,7 +24,7 @@ def command(
     stable: Annotated[
         str,
         option(
-            "Markers that hardly move against the skull, three at least; or find those "
+            "Markers that hardly move against the skull, three at least; automatic: those "
             "whose distances to each other change least.",
             metavar="NAME,NAME,...",
         ),

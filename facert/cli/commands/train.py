@@ -49,13 +49,11 @@ def _option(name: str) -> inspect.Parameter:
     kind, about = DESCRIBED[name]
     plain = next((one for one in (bool, int, float) if one in (kind, *get_args(kind))), str)
     methods = f" One of {', '.join(REGISTRY)}." if name == "method" else ""
-    option = typer.Option(
-        help=about.help + methods,
-        show_default=default_text(name),
-        metavar="|".join(choices(kind)) or None,
-        rich_help_panel=about.group,
+    words = "|".join(choices(kind)) or None
+    made = option(
+        about.help + methods, show_default=default_text(name), metavar=words, panel=about.group
     )
-    annotation = Annotated[plain | None, option]  # type: ignore[valid-type]
+    annotation = Annotated[plain | None, made]  # type: ignore[valid-type]
     keyword = inspect.Parameter.KEYWORD_ONLY
     return inspect.Parameter(name, keyword, default=None, annotation=annotation)
 
@@ -139,7 +137,7 @@ def command(
 
 
 def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, Any]) -> Settings:
-    """Of the model to begin at, of the config file, then of the options that were given."""
+    """Settings of the model to begin at, of the config file, then of the options given."""
     from facert.io.toml import read_toml
 
     settings = DEFAULTS if begin is None else replace(begin.settings, labels=None)
@@ -151,7 +149,7 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
 
 
 def _regions(given: str | None) -> Regions | str | None:
-    """Of the option: the word auto, or what is in a file."""
+    """Regions of the option: the word auto, or those of a file."""
     from facert.data.regions import AUTO
     from facert.io.toml import read_regions
 
@@ -166,7 +164,7 @@ def _check_regions(given: str | None, regions: Regions | str | None, take: Take)
 
 
 def _warn_of_idle_settings(settings: Settings, unasked: Settings) -> None:
-    """Say which settings that somebody chose are the shared models' alone, if another learns."""
+    """Warn of settings that were chosen and are the shared models' alone, if another learns."""
     from facert.methods.registry import method_class
 
     idle = [name for name in OF_SHARED if getattr(settings, name) != getattr(unasked, name)]
@@ -176,7 +174,7 @@ def _warn_of_idle_settings(settings: Settings, unasked: Settings) -> None:
 
 
 def _warn_of_idle_options(settings: Settings, options: dict[str, object]) -> None:
-    """Say which options do nothing where nothing is trained step by step."""
+    """Warn of options that do nothing where nothing is trained step by step."""
     idle = [name for name, given in options.items() if given]
     if idle:
         names = " and ".join(idle)

@@ -111,8 +111,8 @@ def _description(param: TyperArgument | TyperOption) -> Text:
     text, default = Text(param.help or ""), param.default
     if isinstance(param.show_default, str):
         default = param.show_default
-    if param.required:
-        text.append(" [required]", style="dim red")
+    if param.required and isinstance(param, TyperOption):
+        text.append(" [required]", style="red")
     elif param.show_default and default is not False and default not in (None, "", ()):
         shown = default.value if isinstance(default, Enum) else default
         text.append(f" [default: {shown}]", style="dim")

@@ -91,6 +91,15 @@ JOBS = Annotated[
 OVERWRITE = Annotated[bool, file_option("Replace existing output files.", "--overwrite")]
 
 
+def numbers(text: str, option: str) -> list[int]:
+    """The whole numbers of an option, with commas between them."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        fix = "give numbers with commas, as in 0,12,30"
+        raise typer.BadParameter(fix, param_hint=option) from None
+
+
 @dataclass(frozen=True)
 class MappingOptions:
     """What the options of a command ask for, of takes that go through a model."""
