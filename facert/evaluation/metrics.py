@@ -14,17 +14,7 @@ from facert.data.take import Controls, Take
 
 @dataclass(frozen=True)
 class GroupError:
-    """RMS over one part of the face.
-
-    Parameters
-    ----------
-    name : str
-        The part.
-    controls : int
-        How many controls it has.
-    rms : float
-        In the controls' own units.
-    """
+    """RMS over one part of the face and the number of its controls, in the controls' own units."""
 
     name: str
     controls: int
@@ -33,17 +23,7 @@ class GroupError:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A result against the truth.
-
-    Parameters
-    ----------
-    frames, controls : int
-        How many were compared.
-    rms : float
-        Over all of them, in the controls' own units.
-    groups : tuple of GroupError
-        The same for each part of the face.
-    """
+    """RMS of a result against the truth over so many frames and controls, and for each part."""
 
     frames: int
     controls: int

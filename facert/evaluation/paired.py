@@ -16,14 +16,7 @@ LEAST = 1e-12  # an RMS below this is as good as none; one can still divide by i
 
 @dataclass(frozen=True)
 class MeanWithError:
-    """A mean over draws.
-
-    Parameters
-    ----------
-    value : float
-    se : float
-        Its standard error; NaN with a single draw.
-    """
+    """A mean over draws and its standard error, NaN with a single draw."""
 
     value: float
     se: float

@@ -8,7 +8,7 @@ methods meet the same data. The draws of one repeat are nested: 20 labels are 10
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -203,32 +203,19 @@ def training_take(problem: Problem, chosen: Draw, repeat: int) -> Take:
     take, rows = problem.take, np.union1d(chosen.labelled, chosen.unlabelled)
     params = np.where(np.isin(rows, chosen.labelled)[:, None], _poses(take)[rows], np.nan)
     pool = _poses(take) if take.animation is None else take.animation
-    source = take.source.matrix[rows] + _noise(problem, take, repeat)[rows]
-    return replace(
-        take,
-        time=take.time[rows],
-        source=take.source.with_matrix(source),
-        params=params,
-        std=None,
-        animation=pool[chosen.poses] if len(chosen.poses) else None,
-    )
+    animation = pool[chosen.poses] if len(chosen.poses) else None
+    source = _noisy(problem, take, repeat)[rows]
+    return _frames_of(take, rows, source, params=params, animation=animation)
 
 
 def held_out_take(problem: Problem, chosen: Draw, repeat: int) -> Take:
     """The test frames, with noise and gaps and without poses."""
     take, rows = problem.test, chosen.test
-    source = take.source.matrix[rows] + _noise(problem, take, repeat)[rows]
+    source = _noisy(problem, take, repeat)[rows]
     shape = take.source.values.shape[:2]
     hidden = _rng(problem, repeat, _GAPS).random(shape)[rows] < problem.protocol.missing
     source[np.repeat(hidden, source.shape[1] // shape[1], axis=1)] = np.nan
-    return replace(
-        take,
-        time=take.time[rows],
-        source=take.source.with_matrix(source),
-        params=None,
-        std=None,
-        animation=None,
-    )
+    return _frames_of(take, rows, source, params=None, animation=None)
 
 
 def true_poses(problem: Problem, chosen: Draw) -> FloatArray:
@@ -271,13 +258,20 @@ def _capped(problem: Problem, candidates: IntArray, repeat: int) -> IntArray:
     return np.sort(np.concatenate(stretches)[:most])
 
 
-def _noise(problem: Problem, take: Take, repeat: int) -> FloatArray:
-    """Noise for every frame of one of the takes, (T, D)."""
+def _frames_of(take: Take, rows: IntArray, source: FloatArray, **poses: Any) -> Take:
+    """Some frames of a take, with this source (n, D) and these poses."""
+    source_of = take.source.with_matrix(source)
+    return replace(take, time=take.time[rows], source=source_of, std=None, **poses)
+
+
+def _noisy(problem: Problem, take: Take, repeat: int) -> FloatArray:
+    """The source of one of the takes with the noise of a repeat, (T, D)."""
     known = problem.take.source.matrix
     known = known[:, ~np.isnan(known).all(axis=0)]
     std = problem.protocol.noise * Normalisation.of(known, "/source").scale
     rng = _rng(problem, repeat, _NOISE, int(take is not problem.take))
-    return std * rng.standard_normal(take.source.matrix.shape)
+    clean = take.source.matrix
+    return clean + std * rng.standard_normal(clean.shape)
 
 
 def _rng(problem: Problem, repeat: int, *purpose: int) -> np.random.Generator:

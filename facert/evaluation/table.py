@@ -70,15 +70,7 @@ class EvaluationRow:
 class Column:
     """A column of the table, on a terminal and in a report.
 
-    Parameters
-    ----------
-    title : str
-    field : str
-        The attribute of an `EvaluationRow`.
-    form : str
-        How a value is formatted.
-    absent : str
-        What stands for no value.
+    It shows a field of an `EvaluationRow`, formatted as `form`, or `absent` where there is none.
     """
 
     title: str

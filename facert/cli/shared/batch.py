@@ -21,15 +21,9 @@ Work = Callable[[Path, Path], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """Files to read, each with the file to write from it.
+    """Files to read, each with the file to write from it, and how many at a time.
 
-    Parameters
-    ----------
-    pairs : tuple of (Path, Path)
-    many : bool
-        Whether a folder was asked for: each file then has its line, whether it failed or not.
-    jobs : int
-        Files at a time.
+    Where there are to be many, each has its line, whether it failed or not.
     """
 
     pairs: tuple[tuple[Path, Path], ...]
