@@ -9,7 +9,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.rig import Rig
-from facert.data.take import Source, Take
+from facert.data.take import Take
 from facert.errors import InputError
 
 log = logging.getLogger("facert")
@@ -45,7 +45,7 @@ def with_units(found: Take | Rig, units: str) -> Take | Rig:
         log.info("the file does not say its unit: it is taken to be %s", wanted)
         return replace(found, units=wanted)
     factor = METRES[checked_unit(found.units, "units")] / METRES[wanted]
-    return replace(_scaled(found, factor), units=wanted)
+    return replace(_moved(found, factor * np.eye(3)), units=wanted)
 
 
 def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
@@ -62,9 +62,8 @@ def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
         turn = np.eye(3)
     else:
         turn = _FROM_Y[wanted] @ _FROM_Y[checked_axis(present, "up_axis")].T
-    if isinstance(found, Rig):
-        return replace(found, neutral=found.neutral @ turn.T, shapes=found.shapes @ turn.T)
-    return replace(found, source=_moved(found.source, turn), up_axis=wanted)
+    moved = _moved(found, turn)
+    return moved if isinstance(moved, Rig) else replace(moved, up_axis=wanted)
 
 
 def in_metres(units: str) -> float | None:
@@ -98,15 +97,12 @@ def checked_axis(name: str, field: str) -> str:
     return axis
 
 
-def _scaled(found: Take | Rig, factor: float) -> Take | Rig:
+def _moved(found: Take | Rig, matrix: FloatArray) -> Take | Rig:
+    """Positions times a matrix that mixes no axes; weights have no place."""
     if isinstance(found, Rig):
-        return replace(found, neutral=found.neutral * factor, shapes=found.shapes * factor)
-    return replace(found, source=_moved(found.source, factor * np.eye(3)))
-
-
-def _moved(source: Source, matrix: FloatArray) -> Source:
-    """Markers (T, M, 3) times a matrix that mixes no axes; weights have no place."""
+        return replace(found, neutral=found.neutral @ matrix.T, shapes=found.shapes @ matrix.T)
+    source = found.source
     if source.kind == "weights":
-        return source
+        return found
     std = None if source.std is None else source.std @ np.abs(matrix).T
-    return replace(source, values=source.values @ matrix.T, std=std)
+    return replace(found, source=replace(source, values=source.values @ matrix.T, std=std))

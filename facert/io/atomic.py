@@ -50,7 +50,8 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
         fix = "Choose another place, or make room there."
         raise InputError("output", expected, found, fix, where=str(path)) from error
     finally:
-        _discard(temporary)
+        with suppress(OSError):  # it may be gone, or its folder may not be there
+            temporary.unlink()
 
 
 def _flush(path: Path) -> None:
@@ -62,9 +63,3 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _discard(path: Path) -> None:
-    """Remove the temporary file if it is there; where none can be, there is none."""
-    with suppress(OSError):
-        path.unlink()

@@ -158,11 +158,11 @@ def read_npz_rig(path: Path, shapes: str | None = None) -> Rig:
     with open_archive(path) as archive:
         sets = [key.removesuffix("_deltas") for key in archive.keys if key.endswith("_deltas")]
         prefix = _choose(sets, shapes, "--shapes")
-        deltas, names = ("deltas", "names") if prefix is None else _prefixed(prefix)
+        before = "" if prefix is None else f"{prefix}_"
         return Rig(
             neutral=archive.numbers("neutral"),
-            shapes=archive.numbers(deltas),
-            names=archive.names(names),
+            shapes=archive.numbers(f"{before}deltas"),
+            names=archive.names(f"{before}names"),
             faces=archive.integers("faces"),
         )
 
@@ -180,10 +180,6 @@ def _declared_type(stream: IO[bytes], held: int) -> np.dtype[Any]:
     if math.prod(shape) * max(dtype.itemsize, 1) > held:
         raise ValueError("declares more than there is")
     return dtype
-
-
-def _prefixed(prefix: str) -> tuple[str, str]:
-    return f"{prefix}_deltas", f"{prefix}_names"
 
 
 def _read_source(archive: Archive) -> Source:

@@ -62,7 +62,8 @@ def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
             keyword, *fields = line.split() or ("",)
             try:
                 if keyword == "v":
-                    vertices.append([float(field) for field in _first_three(fields)])
+                    x, y, z = map(float, fields[:3])  # a weight or colours may follow
+                    vertices.append([x, y, z])
                 elif keyword == "f":
                     triangles += _fan([_vertex(field, len(vertices)) for field in fields])
             except ValueError:
@@ -84,13 +85,6 @@ def _read_shape(path: Path, neutral: FloatArray, faces: IntArray) -> FloatArray:
     if len(own_faces) and not np.array_equal(own_faces, faces):
         log.warning("%s: other faces than the neutral; is the vertex order the same?", path.name)
     return vertices
-
-
-def _first_three(fields: list[str]) -> list[str]:
-    """The coordinates; a weight or colours may follow."""
-    if len(fields) < 3:
-        raise ValueError("a vertex has three coordinates")
-    return fields[:3]
 
 
 def _vertex(corner: str, count: int) -> int:

@@ -150,7 +150,8 @@ def endings(use: Use, *kinds: Kind) -> tuple[str, ...]:
 
 def format_of(path: Path, use: Use, *kinds: Kind) -> Format | None:
     """The format that the name's ending stands for, of those with one of these kinds."""
-    name = FOLDER if path.is_dir() else path.name.lower() if path.suffix else ""
+    folder = use == "read" and path.is_dir()
+    name = FOLDER if folder else path.name.lower() if path.suffix else ""
     able = (one for one in FORMATS if one.functions(use).keys() & set(kinds))
     return next((one for one in able if name.endswith(one.endings)), None)
 

@@ -78,7 +78,8 @@ def simulate_capture(
     else:
         chosen = _checked_vertices(rig, vertices)
     actor = Rig(rig.neutral[chosen], rig.shapes[:, chosen], rig.names, np.empty((0, 3), np.int64))
-    positions = actor.deform(_shape_weights(drive, performance.source.values))
+    weights = performance.source.values[:, drive]
+    positions = actor.deform(np.where(drive >= 0, weights, 0.0))
     _, noise_seed, gap_seed = np.random.SeedSequence(seed).spawn(3)
     scatter = np.random.default_rng(noise_seed).standard_normal(positions.shape)
     positions += noise * _largest_deviation(positions) * scatter
@@ -150,13 +151,6 @@ def _matching_weights(shapes: Sequence[str], weights: Sequence[str]) -> IntArray
 def _without_side(name: str) -> str:
     """The whole of which a shape with a side is one half."""
     return folded(name).removesuffix("left").removesuffix("right")
-
-
-def _shape_weights(drive: IntArray, values: FloatArray) -> FloatArray:
-    """Weights of all shapes, (T, P); 0 where nothing drives them."""
-    weights = np.zeros((len(values), len(drive)))
-    weights[:, drive >= 0] = values[:, drive[drive >= 0]]
-    return weights
 
 
 def _largest_deviation(positions: FloatArray) -> float:

@@ -32,7 +32,9 @@ class RigidMotion:
     def after(self, first: RigidMotion) -> RigidMotion:
         """First another motion, then this one; the other may be a single frame for all."""
         rotations = self.rotations @ first.rotations
-        moved = np.einsum("tij,tj->ti", self.rotations, _frames(first.translations, len(self)))
+        moved = np.einsum(
+            "tij,tj->ti", self.rotations, np.broadcast_to(first.translations, (len(self), 3))
+        )
         return RigidMotion(rotations, moved + self.translations)
 
     def inverse(self) -> RigidMotion:
@@ -126,7 +128,3 @@ def mean_motion(motion: RigidMotion) -> RigidMotion:
     """The average motion, one frame."""
     rotation = Rotation.from_matrix(motion.rotations).mean().as_matrix()
     return RigidMotion(rotation[None], motion.translations.mean(axis=0, keepdims=True))
-
-
-def _frames(values: FloatArray, count: int) -> FloatArray:
-    return np.broadcast_to(values, (count, *values.shape[1:]))

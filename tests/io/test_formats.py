@@ -164,6 +164,9 @@ def test_an_output_is_refused_before_any_work(tmp_path):
     with pytest.raises(InputError, match=r"\.livelink\.csv, \.csv, \.json, found '\.glb'"):
         require_output(tmp_path / "a.glb", True, "take")
     require_output(tmp_path / "there.h5", True, "take")
+    (tmp_path / "folder.h5").mkdir()
+    with pytest.raises(OutputExistsError, match=r"folder\.h5"):
+        require_output(tmp_path / "folder.h5", False, "take")
 
 
 @pytest.mark.parametrize("name", ["take.h5", "take.csv", "take.json"])
