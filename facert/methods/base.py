@@ -41,7 +41,7 @@ class Unlabelled:
 
     @property
     def counts(self) -> dict[str, float]:
-        """How many there are of each, as figures of a report."""
+        """The numbers of frames and of poses, as figures of a report."""
         return {"unlabelled frames": len(self.X), "unlabelled poses": len(self.Y)}
 
 
@@ -71,7 +71,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class TrainingReport:
-    """How training went, for people and for the model file.
+    """The course of a training, for people and for the model file.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Method(Protocol):
         ...
 
     def save(self) -> dict[str, FloatArray]:
-        """What was learned, as named arrays."""
+        """The arrays that were learned, by their names."""
         ...
 
     def load(self, arrays: Mapping[str, FloatArray]) -> None:

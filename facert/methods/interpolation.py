@@ -1,4 +1,4 @@
-"""What engines' pose drivers do: interpolate between poses (`rbf`), or take one (`nearest`)."""
+"""Interpolation between poses (`rbf`), and the nearest one (`nearest`), as in pose drivers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What all methods share that regress poses directly on frames.
+"""Regression of poses on frames: the base of every method that learns a `Map`.
 
-Such a method learns a `Map`: plain arrays, and a formula that takes complete frames to poses.
-Around it, `Regression` fills the gaps of the source, saves and loads, and streams.
+A map is plain arrays, and a formula that takes complete frames to poses. Around it, `Regression`
+fills the gaps of the source, saves and loads, and streams.
 """
 
 from __future__ import annotations

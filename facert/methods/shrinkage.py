@@ -42,7 +42,7 @@ class Shrinkage(ArrayGroup):
 
     @classmethod
     def learn(cls, poses: FloatArray, errors: FloatArray) -> Shrinkage:
-        """From all known poses (n, d_y), and the cross-validated errors at the labels, (l, d_y)."""
+        """The shrinkage by all known poses (n, d_y) and cross-validated errors (l, d_y)."""
         C = np.atleast_2d(np.cov(poses, rowvar=False, bias=True))
         # Poses that are all the same have no variance at all.
         ridge = max(RIDGE * float(np.trace(C)) / len(C), np.finfo(np.float64).tiny)

@@ -54,7 +54,7 @@ class KernelRidge:
 
     @classmethod
     def of(cls, K: FloatArray, Y: FloatArray) -> Self:
-        """On a positive semi-definite kernel K (..., n, n), for Y (..., n, d)."""
+        """Regressions of Y (..., n, d) on a positive semi-definite kernel K (..., n, n)."""
         values, vectors = np.linalg.eigh(K)
         return cls(np.maximum(values, 0.0), vectors, vectors.swapaxes(-1, -2) @ Y)
 
@@ -93,7 +93,7 @@ class LinearRidge(KernelRidge):
 
     @classmethod
     def of_inputs(cls, X: FloatArray, Y: FloatArray) -> Self:
-        """On inputs X (n, d_x), for Y (n, d)."""
+        """The regression of Y (n, d) on inputs X (n, d_x)."""
         U, S, Vt = np.linalg.svd(X, full_matrices=len(X) > X.shape[1])
         values = np.pad(S**2, (0, len(X) - len(S)))
         return cls(values, U, U.T @ Y, Vt[: len(S)].T * S)

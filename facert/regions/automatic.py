@@ -66,7 +66,7 @@ class TakeSample:
 
     @classmethod
     def of(cls, take: Take) -> TakeSample:
-        """From at most `MOST_FRAMES` and the labels."""
+        """At most `MOST_FRAMES` frames of a take, and its labels."""
         controls, params, labels = take.controls, take.params, take.labels
         if controls is None or params is None or not len(labels):
             raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
@@ -208,7 +208,7 @@ def _is_upper(group: BoolArray, sample: TakeSample, named: FloatArray) -> bool:
 
 
 def _log_ratio(one: float, other: float) -> float:
-    """Of two variances, finite even if they are 0."""
+    """The logarithm of the ratio of two variances, finite even if they are 0."""
     tiny = np.finfo(np.float64).tiny
     return float(np.log(max(one, tiny)) - np.log(max(other, tiny)))
 

@@ -49,7 +49,7 @@ def two_groups(frames: FloatArray) -> BoolArray:
 
 
 def together(frames: FloatArray) -> FloatArray:
-    """How far things move together: the RV coefficient, 0 to 1.
+    """The RV coefficient of each two things, 0 to 1: how far they move together.
 
     Parameters
     ----------

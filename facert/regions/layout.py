@@ -1,4 +1,4 @@
-"""From named regions to columns of normalised arrays."""
+"""The layout of named regions in columns of normalised arrays."""
 
 from __future__ import annotations
 

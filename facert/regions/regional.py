@@ -45,7 +45,7 @@ WHOLE = 1e-9  # by which the weights of a control may miss 1
 
 @dataclass(frozen=True, eq=False)
 class RegionLayout(ArrayGroup):
-    """What each of r regions sees and moves, in columns of normalised arrays.
+    """The columns of normalised arrays that each of r regions sees and moves, and its units.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class _RegionMethod:
         return Prediction(own.Y * self.target_unit, std, own.X * self.source_unit)
 
     def begin_at(self, old: _RegionMethod, source: Normalisation, target: Normalisation) -> None:
-        """Of the units, given for the face, only what the region sees and moves counts."""
+        """Let the method begin at the old one, with the region's part of the face's units."""
         assert isinstance(self.method, WarmStart)
         self.method.begin_at(
             old.method,
