@@ -137,9 +137,9 @@ def complete_pose(
         raise InputError("hold", "a frame to keep the values of", "none", "Give --from TAKE:FRAME.")
     else:
         posed = completion.pose(asked, samples, rng)
-    names = [controls.names[index] for index in asked.controls]
-    named = dict(zip(names, asked.values.tolist(), strict=True))
-    kept = tuple(controls.names[index] for index in held)
+    names = np.array(controls.names, dtype=np.object_)
+    named = dict(zip(names[asked.controls], asked.values.tolist(), strict=True))
+    kept = tuple(names[held])
     return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept)
 
 

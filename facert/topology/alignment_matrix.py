@@ -73,20 +73,10 @@ def alignment_matrix(
 
 
 def tangent_coordinates(structures: FloatArray, dim: int) -> tuple[FloatArray, FloatArray]:
-    """Tangent coordinates (1) of local structures, in length 1 and a factor.
+    """Tangent coordinates (1) of local structures (n, k, D), as unit vectors and their lengths.
 
-    Parameters
-    ----------
-    structures : array, shape (n, k, D)
-    dim : int
-        d.
-
-    Returns
-    -------
-    g : array, shape (n, k, d)
-        g_1 to g_d of Algorithm 1, line 4, as columns.
-    spread : array, shape (n, d)
-        Singular values, falling; the coordinates (1) are g times these.
+    The first are g_1 to g_d of Algorithm 1, line 4, (n, k, d), the others the singular values,
+    falling, (n, d).
     """
     centred = structures - structures.mean(axis=1, keepdims=True)
     g, spread, _ = np.linalg.svd(centred, full_matrices=False)

@@ -25,7 +25,7 @@ from facert.topology import laplacian
 from facert.topology.alignment_matrix import alignment_matrix
 from facert.topology.labels import checked_labels, lacking_components, require_enough_labels
 from facert.topology.neighbourhoods import Neighbourhoods, mesh_rings
-from facert.topology.radial_basis import Kernel, radial_basis
+from facert.topology.radial_basis import RadialFunction, radial_basis
 from facert.topology.solution import Dense, Elimination, Interpolant
 
 SURFACE = 2  # d
@@ -44,20 +44,20 @@ class DrivingMethod:
     ----------
     energy : callable, optional
         From vertices (V, 3) and faces (F, 3) to a quadratic energy (V, V).
-    kernel : str
+    radial : str
         The radial basis function, where there is no energy.
     displacements : bool
         Whether displacements are interpolated, or positions.
     """
 
     energy: Energy | None = None
-    kernel: Kernel = "linear"
+    radial: RadialFunction = "linear"
     displacements: bool = True
 
     def interpolant(self, vertices: FloatArray, faces: IntArray, labelled: IntArray) -> Interpolant:
         """The map from the labelled vertices (M,) to all of them."""
         if self.energy is None:
-            return radial_basis(vertices, labelled, self.kernel)
+            return radial_basis(vertices, labelled, self.radial)
         return Elimination(self.energy(vertices, faces), labelled)
 
 
@@ -83,8 +83,8 @@ METHODS = {
     "laplacian": DrivingMethod(laplacian.uniform_energy),
     "cotangent": DrivingMethod(laplacian.cotangent_energy),
     "biharmonic": DrivingMethod(laplacian.biharmonic_energy),
-    "rbf-linear": DrivingMethod(kernel="linear"),
-    "rbf-thin-plate": DrivingMethod(kernel="thin_plate_spline"),
+    "rbf-linear": DrivingMethod(radial="linear"),
+    "rbf-thin-plate": DrivingMethod(radial="thin_plate_spline"),
 }
 """Every way to drive a face, the shipped default first."""
 

@@ -59,16 +59,9 @@ def cotangent_matrix(vertices: FloatArray, faces: IntArray) -> tuple[sparse.csc_
     are never negative and which may have edges of three faces. Vertices that no face uses get zero.
     """
     used = np.unique(faces)
-    numbers = np.zeros(len(vertices), dtype=np.int64)
-    numbers[used] = np.arange(len(used))
-    stiffness, mass = robust_laplacian.mesh_laplacian(vertices[used], numbers[faces])
-    entries = sparse.coo_array(stiffness)
-    rows, columns = used[entries.row], used[entries.col]
-    shape = (len(vertices), len(vertices))
-    C = sparse.coo_array((entries.data, (rows, columns)), shape=shape).tocsc()
-    areas = np.zeros(len(vertices))
-    areas[used] = mass.diagonal()
-    return C, areas
+    stiffness, mass = robust_laplacian.mesh_laplacian(vertices[used], np.searchsorted(used, faces))
+    S = sparse.eye_array(len(vertices), format="csc")[:, used]  # the used among all
+    return sparse.csc_array(S @ stiffness @ S.T), np.asarray(S @ mass.diagonal())
 
 
 def squared(L: sparse.csr_array | sparse.csc_array) -> sparse.csc_array:

@@ -34,7 +34,7 @@ from facert.topology.labels import needed_labels, require_enough_labels
 from facert.topology.laplacian import path_energy
 from facert.topology.local_ridge import local_ridge
 from facert.topology.neighbourhoods import temporal_windows
-from facert.topology.radial_basis import Kernel, radial_basis
+from facert.topology.radial_basis import RadialFunction, radial_basis
 from facert.topology.solution import Elimination, Interpolant
 
 STILL = 0.01
@@ -140,7 +140,7 @@ def laplacian(take: KeyedPerformance) -> FloatArray:
     return np.asarray(scaled + displacements(take.less(scaled).labels))
 
 
-def rbf(take: KeyedPerformance, kernel: Kernel) -> FloatArray:
+def rbf(take: KeyedPerformance, kernel: RadialFunction) -> FloatArray:
     """Radial basis functions of each feature point's position (the paper's [16]), (T, G, C)."""
     return _by_source(take, take.explaining, lambda X: radial_basis(X, take.keys, kernel))
 

@@ -18,13 +18,13 @@ from facert.errors import InputError
 from facert.models.threads import one_thread
 from facert.topology.solution import Dense
 
-Kernel = Literal["linear", "thin_plate_spline"]
+RadialFunction = Literal["linear", "thin_plate_spline"]
 
 FLAT = 1e-5  # share of the largest singular value: below, points do not extend along a direction
 SAME = 1e-7  # of the extent of the labels: nearer ones are at one place
 
 
-def radial_basis(X: FloatArray, labelled: IntArray, kernel: Kernel) -> Dense:
+def radial_basis(X: FloatArray, labelled: IntArray, kernel: RadialFunction) -> Dense:
     """Interpolation from the labelled points to all, by Euclidean distance.
 
     Parameters
