@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -41,7 +40,6 @@ MAX_BYTES = 2**30
 
 _SOURCES = {"markers": "marker_names", "positions": "names", "weights": "weight_names"}
 _PLAIN = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
-_DAMAGED = (OSError, ValueError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile)
 
 
 class Archive:
@@ -107,11 +105,8 @@ def open_archive(path: Path) -> Iterator[Archive]:
     """
     with reading(path):
         existing_file(path)
-        try:
+        with parsing("file", "an .npz archive", "Store it anew.", "something else"):
             file = zipfile.ZipFile(path)
-        except _DAMAGED as error:
-            found = "something else"
-            raise InputError("file", "an .npz archive", found, "Store it anew.") from error
         with file:
             yield Archive(file)
 

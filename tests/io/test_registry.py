@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
-from facert.io.registry import FORMATS, endings, function, listed
+from facert.io import registry
+from facert.io.formats import read_take_file
+from facert.io.registry import FORMATS, Format, endings, function, listed, table_rows
 
 
 @pytest.mark.parametrize("one", FORMATS, ids=lambda one: one.endings[0])
@@ -20,6 +22,17 @@ def test_endings_are_those_of_a_kind() -> None:
     assert endings("write", "take") == (".h5", ".hdf5", ".livelink.csv", ".csv", ".json")
     assert endings("read", "mesh") == (".glb", ".gltf", ".obj", ".ply")
     assert ".csv of Live Link Face or plain, .json of Audio2Face" in listed("read", "take")
+
+
+def test_one_declaration_brings_a_format_into_all_lists(tmp_path, monkeypatch) -> None:
+    new = Format((".dat",), {"take": "csv_table.read_table"}, about=" of a test", reads="a test")
+    monkeypatch.setattr(registry, "FORMATS", (*FORMATS, new))
+    path = tmp_path / "a.dat"
+    path.write_text("time,a\n0,1\n0.02,1\n")
+    assert read_take_file(path).source.names == ("a",)
+    assert ".dat" in str(registry.unknown_input(tmp_path / "a.xyz"))
+    assert listed("read", "take").endswith(".dat of a test")
+    assert table_rows()[-1] == "| `.dat` | a test | |"
 
 
 @pytest.mark.parametrize(
