@@ -47,9 +47,9 @@ class Regression(ABC):
     """A method that learns a `Map`.
 
     What a frame does not show is filled in first, from how the source's dimensions go together in
-    all training frames; the cleaned source of a prediction is the filled one. What the
-    fill leaves open adds to the variance of a pose, as it would with the best linear stand-in for
-    the map, y = const + x B: see `facert.models.gaussian.Gaussian.fill_for`.
+    all training frames; the cleaned source of a prediction is the filled one. What the fill leaves
+    open adds to the variance of a pose, as it would with the best linear stand-in for the map,
+    y = const + x B: see `facert.models.gaussian.Gaussian.fill_for`.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Regression(ABC):
         return self
 
     def _stay_on_cpu(self, device: str, does: str) -> None:
-        """Say so where another device was asked for, which must be there nonetheless."""
+        """Warn where another device was asked for, which must be there nonetheless."""
         if device != "cpu" and find_device(device).type != "cpu":  # the second imports torch
             log.warning("%s %s on the CPU: %s is not used", self.settings.method, does, device)
 
@@ -216,7 +216,7 @@ class _FrameStream:
 
     def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x); see `facert.methods.base.Method.predict`."""
-        frame = frame.copy()  # for who asks for the variance, when it may hold another one
+        frame = frame.copy()  # by the time the variance is asked for, it may hold another one
         X = self._gaps.fill(frame)
         Y, own = self._map(X)
         if own is None:

@@ -283,11 +283,13 @@ def untrained_method(settings: Settings, layout: RegionLayout | None = None) -> 
 
 
 def _of_region(face: Normalisation, columns: IntArray, old: float, new: float) -> Normalisation:
-    """Units of a region in those that it had, from the face's and the region's own in both."""
+    """A region's units in its old ones, from the face's in its old ones."""
     return Normalisation(face.mean[columns] / old, face.scale * new / old)
 
 
 class _RegionalStream:
+    """Maps frames one after the other, with a stream a region."""
+
     def __init__(self, method: Regional) -> None:
         self.method = method
         self.streams = [part.method.stream() for part in method.parts_]
