@@ -20,7 +20,13 @@ from facert.data.arrays import BoolArray, FloatArray
 from facert.preprocess.motion.motion import LEAST_VARIANCE, Motion
 from facert.preprocess.motion.motion_factors import MotionFactors
 from facert.preprocess.motion.series import capture_noise
-from facert.preprocess.motion.smoothing import forward_covariance, transition
+from facert.preprocess.motion.smoothing import (
+    carried,
+    factor_chain,
+    factor_update,
+    series_after,
+    series_chain,
+)
 
 LEAST_REST = 1e-2
 """Least variance of what is left over of a column, relative to that of the noise."""
@@ -88,7 +94,7 @@ class MotionFilter:
 
     @property
     def variance(self) -> FloatArray:
-        """Of the latest mean, (d,)."""
+        """Variance of the latest mean, (d,)."""
         return self._shared.variance + self._rest.variance
 
     def _believed(self, frame: FloatArray, seen: Seen) -> Seen:
@@ -107,7 +113,7 @@ class MotionFilter:
 
 
 @dataclass(frozen=True, eq=False)
-class _Update:
+class _Gain:
     """The update of the factors by a frame that shows some columns, whatever its values.
 
     Parameters
@@ -135,23 +141,21 @@ class _Update:
 
 
 class _FactorFilter:
-    """Of the factors z and their velocities, observed together, see `smoothing.smooth_factors`."""
+    """A Kalman filter of the factors and their velocities, see `smoothing.smooth_factors`."""
 
     def __init__(self, factors: MotionFactors, rates: FloatArray) -> None:
         self._factors = factors
         q, d = factors.count, len(factors.mean)
-        blocks = transition(rates)
-        self._F = np.block([[np.diag(block) for block in row] for row in blocks])
-        self._Q = np.eye(2 * q) - self._F @ self._F.T
+        self._F, self._Q = factor_chain(rates)
         self._m = self._m_ahead = np.zeros(2 * q)
-        start = _Update(None, np.zeros((2 * q, d)), np.eye(2 * q), np.zeros(d), settled=False)
+        start = _Gain(None, np.zeros((2 * q, d)), np.eye(2 * q), np.zeros(d), settled=False)
         self._last = self._next = start
         self.expected = factors.mean
         """The next frame, (d,), before it is seen."""
 
     @property
     def variance(self) -> FloatArray:
-        """Of the latest mean, (d,)."""
+        """Variance of the latest mean, (d,)."""
         return self._last.variance
 
     def set_noise(self, factors: MotionFactors) -> None:
@@ -159,14 +163,14 @@ class _FactorFilter:
         self._factors, self._last = factors, replace(self._last, settled=False)
 
     def look_ahead(self) -> None:
-        """Predict the next frame, and what it will do if it shows what the last one did."""
+        """Predict the next frame, and its gain if it shows the columns of the last one."""
         factors, last = self._factors, self._last
         self._m_ahead = self._F @ self._m
         self.expected = factors.mean + factors.weights @ self._m_ahead[: factors.count]
         self._next = last if last.settled else self._update(last.seen)
 
     def step(self, frame: FloatArray, seen: Seen) -> FloatArray:
-        """What the factors make of a frame, (d,)."""
+        """The mean (d,) of a frame by the factors."""
         if not self._next.is_for(seen):
             self._next = self._update(seen)
         self._last = self._next
@@ -174,19 +178,17 @@ class _FactorFilter:
         self._m = self._m_ahead + change
         return np.asarray(self.expected + self._factors.weights @ change[: self._factors.count])
 
-    def _update(self, seen: Seen) -> _Update:
+    def _update(self, seen: Seen) -> _Gain:
         factors, q, before = self._factors, self._factors.count, self._last.P
         weight = 1.0 / factors.noise if seen is None else seen / factors.noise
         weighted = factors.weights * weight[:, None]
         precision = factors.weights.T @ weighted
-        P = self._F @ before @ self._F.T + self._Q
-        pulled = P[:, :q] @ np.linalg.inv(np.eye(q) + precision @ P[:q, :q])
-        after = P - pulled @ precision @ P[:q]
-        after = (after + after.T) / 2.0
+        update = factor_update(self._F @ before @ self._F.T + self._Q, precision)
+        after = update.after
         change = np.abs(after.diagonal() - before.diagonal()).max()
-        return _Update(
+        return _Gain(
             seen,
-            gain=pulled @ weighted.T,
+            gain=update.take @ weighted.T,
             P=after,
             variance=factors.variance(after[None, :q, :q])[0],
             settled=bool(change < SETTLED * after.diagonal().min()),
@@ -194,18 +196,10 @@ class _FactorFilter:
 
 
 class _SeriesFilter:
-    """Of independent series with their velocities, see `smoothing.smooth_series`; adaptive.
-
-    Covariances (3, d) are those of value, value with velocity, and velocity.
-    """
+    """An adaptive Kalman filter of independent series, see `smoothing.smooth_series`."""
 
     def __init__(self, variance: FloatArray, rates: FloatArray, noise: float) -> None:
-        F = transition(rates)
-        self._F, self._noise = F, noise
-        self._forward = forward_covariance(F)
-        prior = np.stack([variance, np.zeros_like(variance), variance])
-        self._drift = prior - (self._forward * prior).sum(axis=1)
-        self._prior = prior
+        self._chain, self._noise = series_chain(variance, rates), noise
         self._m = self._m_ahead = np.zeros((2, len(variance)))
         self._begin()
 
@@ -213,10 +207,10 @@ class _SeriesFilter:
         """Begin with the prior covariance again, at the present values and at rest."""
         self._m = self._m * [[1.0], [0.0]]
         # Of the latest frame: the covariance before it was seen, and the gain.
-        self._P, self._gain = self._prior, np.zeros_like(self._m)
-        self._P_ahead = self._prior
-        self._width = np.ones_like(self._prior[0])
-        self._found = self._predicted = self._prior[0] + self._noise
+        self._P, self._gain = self._chain.prior, np.zeros_like(self._m)
+        self._P_ahead = self._chain.prior
+        self._width = np.ones_like(self._chain.prior[0])
+        self._found = self._predicted = self._chain.prior[0] + self._noise
 
     @property
     def expected(self) -> FloatArray:
@@ -225,12 +219,12 @@ class _SeriesFilter:
 
     @property
     def predicted(self) -> FloatArray:
-        """Their variance, with the noise, (d,)."""
+        """Variance of the next values, with the noise, (d,)."""
         return np.asarray(self._P_ahead[0] + self._noise)
 
     @property
     def variance(self) -> FloatArray:
-        """Of the latest mean, (d,)."""
+        """Variance of the latest mean, (d,)."""
         return np.asarray(self._P[0] * (1.0 - self._gain[0]))
 
     def set_noise(self, noise: float) -> None:
@@ -242,9 +236,8 @@ class _SeriesFilter:
 
     def look_ahead(self) -> None:
         """Predict the next values."""
-        m, P = self._m, self._P - self._gain[[0, 0, 1]] * self._P[[0, 1, 1]]
-        self._m_ahead = self._F[:, 0] * m[0] + self._F[:, 1] * m[1]
-        self._P_ahead = (self._forward * P).sum(axis=1) + self._width * self._drift
+        self._m_ahead = carried(self._chain.F, self._m)
+        self._P_ahead = self._chain.carry(series_after(self._P, self._gain), self._width)
 
     def step(self, values: FloatArray, seen: Seen) -> FloatArray:
         """The mean (d,) after one more value of each."""
@@ -256,7 +249,7 @@ class _SeriesFilter:
         return np.asarray(self._m[0])
 
     def _widened(self, surprise: FloatArray, seen: Seen) -> FloatArray:
-        """How much wider than so far each is taken to vary, after this surprise."""
+        """Factors by which the variance of each series changes after this surprise, (d,)."""
         fresh = 1.0 - MEMORY if seen is None else (1.0 - MEMORY) * seen
         self._found = self._found + fresh * (surprise * surprise - self._found)
         self._predicted = self._predicted + fresh * (self.predicted - self._predicted)

@@ -57,7 +57,7 @@ class Smoothed:
     following: FloatArray
 
 
-class _Update(NamedTuple):
+class FactorUpdate(NamedTuple):
     """Covariances of factors and velocities before and after a frame is seen.
 
     The frame takes the mean m to keep m + take pull.
@@ -69,7 +69,7 @@ class _Update(NamedTuple):
     take: FloatArray
 
 
-class _SeriesUpdate(NamedTuple):
+class SeriesUpdate(NamedTuple):
     """Covariances (3, d) of value and velocity before and after a frame, and its gain (2, d)."""
 
     before: FloatArray
@@ -77,7 +77,7 @@ class _SeriesUpdate(NamedTuple):
     gain: FloatArray
 
 
-Update = TypeVar("Update", _Update, _SeriesUpdate)
+Update = TypeVar("Update", FactorUpdate, SeriesUpdate)
 
 
 def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Smoothed:
@@ -93,10 +93,11 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
         How quickly each factor moves, see `decay`.
     """
     frames, q = len(pull), pull.shape[-1]
-    F = np.block([[np.diag(block) for block in row] for row in transition(a)])
+    F, drift = factor_chain(a)
     if precision.ndim > 3 and (precision == precision[:, :1]).all():
         precision = precision[:, :1]  # all stretches are known equally well
-    filtered = _filtered(precision, F)
+    P = np.broadcast_to(np.eye(2 * q), (*precision.shape[1:-2], 2 * q, 2 * q))
+    filtered = _forward(precision, P, lambda P: F @ P @ F.T + drift, factor_update, _settled)
     m = np.zeros((*pull.shape[1:-1], 2 * q))
     before, after = (np.empty((frames, *m.shape)) for _ in range(2))
     for t, update in enumerate(filtered):
@@ -104,14 +105,6 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
         m = _times(update.keep, before[t]) + _times(update.take, pull[t])
         after[t] = m
     return _smoothed(filtered, F, before, after)
-
-
-def _filtered(precision: FloatArray, F: FloatArray) -> list[_Update]:
-    """The filter's update at each frame."""
-    one = np.eye(len(F))
-    P = np.broadcast_to(one, (*precision.shape[1:-2], *F.shape))
-    drift = one - F @ F.T
-    return _forward(precision, P, lambda P: F @ P @ F.T + drift, _seen, _settled)
 
 
 def _forward(
@@ -154,14 +147,15 @@ def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
     return np.concatenate([[False], same])
 
 
-def _seen(P: FloatArray, precision: FloatArray) -> _Update:
+def factor_update(P: FloatArray, precision: FloatArray) -> FactorUpdate:
+    """The update of covariances (..., 2 q, 2 q) by a frame of some precision, (..., q, q)."""
     q = precision.shape[-1]
     take = P[..., :q] @ np.linalg.inv(np.eye(q) + precision @ P[..., :q, :q])
     gain = take @ precision
     keep = np.broadcast_to(np.eye(2 * q), P.shape).copy()
     keep[..., :q] -= gain
     after = P - gain @ P[..., :q, :]
-    return _Update(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, take)
+    return FactorUpdate(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, take)
 
 
 def _settled(P: FloatArray, last: FloatArray) -> bool:
@@ -177,7 +171,7 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _smoothed(
-    filtered: list[_Update], F: FloatArray, before: FloatArray, after: FloatArray
+    filtered: list[FactorUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> Smoothed:
     """Back over the frames; `before` and `after`, (T, ..., 2 q), are means, and are changed."""
     frames, q = len(filtered), F.shape[0] // 2
@@ -223,34 +217,30 @@ def smooth_series(
     -------
     mean, variance : array, shape (T, d)
     """
-    F, X = transition(a), np.where(seen, X, 0.0)
-    filtered = _series_filtered(seen, variance, noise, F)
+    chain = series_chain(variance, a)
+    F, X = chain.F, np.where(seen, X, 0.0)
+    filtered = _series_filtered(seen, noise, chain)
     before, after = (np.empty((len(X), 2, len(a))) for _ in range(2))
     m = np.zeros((2, len(a)))
     for t, update in enumerate(filtered):
-        before[t] = _carried(F, m) if t else m
+        before[t] = carried(F, m) if t else m
         m = before[t] + update.gain * (X[t] - before[t, 0])
         after[t] = m
     return _series_smoothed(filtered, F, before, after)
 
 
-def _series_filtered(
-    seen: BoolArray, variance: FloatArray, noise: float, F: FloatArray
-) -> list[_SeriesUpdate]:
-    """As `_filtered`."""
+def _series_filtered(seen: BoolArray, noise: float, chain: SeriesChain) -> list[SeriesUpdate]:
+    """The filter's update at each frame (T, d)."""
 
-    def see(P: FloatArray, there: FloatArray) -> _SeriesUpdate:
+    def see(P: FloatArray, there: FloatArray) -> SeriesUpdate:
         gain = np.where(there, P[:2] / (P[0] + noise), 0.0)
-        after = P - np.stack([gain[0] * P[0], gain[0] * P[1], gain[1] * P[1]])
-        return _SeriesUpdate(P, after, gain)
+        return SeriesUpdate(P, series_after(P, gain), gain)
 
-    forward, P = forward_covariance(F), np.stack([variance, np.zeros_like(variance), variance])
-    drift = P - (forward * P).sum(axis=1)
-    return _forward(seen, P, lambda P: (forward * P).sum(axis=1) + drift, see, _series_settled)
+    return _forward(seen, chain.prior, chain.carry, see, _series_settled)
 
 
 def _series_smoothed(
-    filtered: list[_SeriesUpdate], F: FloatArray, before: FloatArray, after: FloatArray
+    filtered: list[SeriesUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """As `_smoothed`: mean and variance of the value, (T, d)."""
     frames, P = len(filtered), filtered[-1].after
@@ -267,7 +257,7 @@ def _series_smoothed(
             last, P = P, here.after + (backward * (P - following.before)).sum(axis=1)
             settled = same and _series_settled(P, last)
         variance[t] = P[0]
-        after[t] += _carried(gain, after[t + 1] - before[t + 1])
+        after[t] += carried(gain, after[t + 1] - before[t + 1])
     return after[:, 0], variance
 
 
@@ -279,7 +269,7 @@ def _series_gain(after: FloatArray, F: FloatArray, before: FloatArray) -> FloatA
     return np.asarray(np.einsum("ikd,kjd->ijd", cross, inverse))
 
 
-def _carried(F: FloatArray, m: FloatArray) -> FloatArray:
+def carried(F: FloatArray, m: FloatArray) -> FloatArray:
     """F (2, 2, d) times value and velocity (2, d)."""
     return np.asarray(F[:, 0] * m[0] + F[:, 1] * m[1])
 
@@ -288,6 +278,41 @@ def _series_settled(P: FloatArray, last: FloatArray) -> bool:
     """Whether covariances (3, d) are what they were."""
     scale = np.stack([P[0], np.sqrt(P[0] * P[2]), P[2]])
     return bool((np.abs(P - last) <= SETTLED * scale).all())
+
+
+def factor_chain(a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Transition of factors and velocities at rates (q,), and its noise, (2 q, 2 q) each."""
+    F = np.block([[np.diag(block) for block in row] for row in transition(a)])
+    return F, np.eye(len(F)) - F @ F.T
+
+
+class SeriesChain(NamedTuple):
+    """How series and their covariances (3, d), of value, value with velocity and velocity, go on.
+
+    F (2, 2, d) and forward (3, 3, d) take means and covariances one frame on, to which the noise
+    of the transition adds drift (3, d); before the first frame they are prior.
+    """
+
+    F: FloatArray
+    forward: FloatArray
+    prior: FloatArray
+    drift: FloatArray
+
+    def carry(self, P: FloatArray, width: FloatArray | float = 1.0) -> FloatArray:
+        """Covariances at the next frame, with the drift so many times wider."""
+        return np.asarray((self.forward * P).sum(axis=1) + width * self.drift)
+
+
+def series_chain(variance: FloatArray, a: FloatArray) -> SeriesChain:
+    """The chain of series of given variances and rates, (d,)."""
+    F = transition(a)
+    forward, prior = forward_covariance(F), np.stack([variance, np.zeros_like(variance), variance])
+    return SeriesChain(F, forward, prior, prior - (forward * prior).sum(axis=1))
+
+
+def series_after(P: FloatArray, gain: FloatArray) -> FloatArray:
+    """Covariances (3, d) after a frame that has a gain (2, d)."""
+    return P - gain[[0, 0, 1]] * P[[0, 1, 1]]
 
 
 def forward_covariance(F: FloatArray) -> FloatArray:

@@ -109,7 +109,7 @@ def with_a_gap(frames=120):
     return seen
 
 
-def test_where_knowledge_has_settled_no_more_of_it_is_worked_out_and_nothing_changes(monkeypatch):
+def test_covariances_that_have_settled_are_computed_no_more_and_nothing_changes(monkeypatch):
     rng, a = np.random.default_rng(4), np.array([0.1, 0.7])
     W, seen = rng.normal(size=(3, 2)), with_a_gap()
     precision = np.stack([W.T @ np.diag(100.0 * there) @ W for there in seen])
@@ -123,9 +123,9 @@ def test_where_knowledge_has_settled_no_more_of_it_is_worked_out_and_nothing_cha
     np.testing.assert_allclose(quick_series, whole_series, rtol=1e-7, atol=1e-9)
 
 
-def test_knowledge_settles_where_frames_show_the_same_and_moves_on_where_they_do_not():
-    F, seen = transition(np.full(3, 0.5)), with_a_gap()
-    known = [id(k) for k in smoothing._series_filtered(seen, np.ones(3), 0.1, F)]
+def test_covariances_settle_where_frames_show_the_same_and_change_where_they_do_not():
+    chain, seen = smoothing.series_chain(np.ones(3), np.full(3, 0.5)), with_a_gap()
+    known = [id(k) for k in smoothing._series_filtered(seen, 0.1, chain)]
     assert len(set(known[40:50])) == len(set(known[110:])) == 1
     assert len(set(known)) > 20
     assert known[49] != known[50]
