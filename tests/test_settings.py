@@ -50,7 +50,7 @@ def test_changes_leave_the_rest_as_it_was():
     assert (changed.seed, changed.latent_dim) == (3, 4)
 
 
-def test_an_unknown_name_is_told_with_the_known_ones():
+def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"latent_dims: expected one of .*latent_dim"):
         Settings().with_changes({"latent_dims": 4})
 

@@ -30,7 +30,7 @@ def test_a_full_disk_is_one_line():
     assert done.stderr == f"error: input or output: {os.strerror(28)}\n"
 
 
-def test_ctrl_c_says_stopped(facert, monkeypatch):
+def test_ctrl_c_reports_that_it_stopped(facert, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 

@@ -33,7 +33,7 @@ def test_a_folder_is_done_file_by_file_and_a_bad_one_stops_none(facert, folder, 
     )
 
 
-def test_what_is_there_already_is_left_alone_unless_told_otherwise(facert, folder):
+def test_what_is_there_already_is_left_alone_unless_asked_otherwise(facert, folder):
     takes, out = [folder / f"take{seed}.h5" for seed in range(3)], folder / "out"
     out.mkdir()
     (out / "take1.h5").write_text("mine")

@@ -53,7 +53,7 @@ def test_poses_and_clock_are_kept(facert, files):
     assert (found.units, found.fps) == (truth.units, truth.fps)
 
 
-def test_bad_markers_are_filled_unless_they_are_to_be_believed(facert, files):
+def test_bad_markers_are_filled_unless_all_are_taken_as_observed(facert, files):
     path, truth, noisy, output = files
     markers = noisy.source.values.copy()
     markers[100:120, 2] = 0.0

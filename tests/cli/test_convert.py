@@ -132,7 +132,7 @@ def test_rate_unit_and_axis_are_converted(facert, capture, tmp_path):
     np.testing.assert_allclose(read_take_file(tmp_path / "mm.h5").source.values[0], [[10, 20, 30]])
 
 
-def test_what_in_does_not_say_is_taken_to_be_as_asked_and_told(facert, capture, tmp_path):
+def test_what_in_does_not_state_is_taken_to_be_as_asked_with_a_warning(facert, capture, tmp_path):
     done = facert("convert", capture, tmp_path / "take.h5", "--units", "cm", "--up-axis", "y")
     assert "does not say its unit: it is taken to be cm" in done.err
     assert "does not say its up axis: it is taken to be y" in done.err

@@ -36,11 +36,11 @@ def is_blank(picture: Path) -> bool:
     return float(np.std(imread(picture)[..., :3])) < 0.02
 
 
-def test_demo_writes_four_files_and_says_what_next(tmp_path: Path) -> None:
-    said = call("demo", tmp_path / "new")
+def test_demo_writes_four_files_and_prints_what_next(tmp_path: Path) -> None:
+    shown = call("demo", tmp_path / "new")
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == sorted(FILES)
-    assert "facert train" in said
-    assert "facert retarget" in said
+    assert "facert train" in shown
+    assert "facert retarget" in shown
 
 
 def test_demo_keeps_what_is_there(demo: Path) -> None:
@@ -50,8 +50,8 @@ def test_demo_keeps_what_is_there(demo: Path) -> None:
 
 def test_render_draws_faces(demo: Path, tmp_path: Path) -> None:
     take, picture = demo / "performance.h5", tmp_path / "faces.png"
-    said = call("render", take, picture, "--rig", demo / "character.h5", "--frames", "0,200")
-    assert "0, 200" in said
+    shown = call("render", take, picture, "--rig", demo / "character.h5", "--frames", "0,200")
+    assert "0, 200" in shown
     assert not is_blank(picture)
 
 

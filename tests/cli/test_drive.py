@@ -92,16 +92,16 @@ def test_a_glb_holds_morph_targets(facert, files, tmp_path):
     assert (tmp_path / "out.glb").read_bytes()[:4] == b"glTF"
 
 
-def test_a_glb_of_a_mesh_without_a_unit_is_warned_of_unless_it_is_told(
+def test_a_glb_of_a_mesh_without_a_unit_is_warned_of_unless_it_is_given(
     facert, files, rig, tmp_path
 ):
     _, take, _ = files
     mesh, out = tmp_path / "bare.h5", tmp_path / "out.glb"
     write_rig_file(replace(rig, units=""), mesh)
     assert "--in-units cm" in facert("drive", mesh, take, out).err
-    told = facert("drive", mesh, take, out, "--in-units", "cm", "--overwrite")
-    assert told.code == 0
-    assert "warning" not in told.err
+    given = facert("drive", mesh, take, out, "--in-units", "cm", "--overwrite")
+    assert given.code == 0
+    assert "warning" not in given.err
     assert b'"scale":[0.01' in out.read_bytes().replace(b" ", b"")
     assert "warning" not in facert("drive", mesh, take, tmp_path / "out.h5").err
     refused = facert("drive", mesh, take, out, "--in-units", "ell", "--overwrite")
@@ -118,7 +118,7 @@ def test_a_glb_of_a_mesh_without_a_unit_is_warned_of_unless_it_is_told(
         ((), "cm", ("add --fit", "MESH in cm")),
     ],
 )
-def test_points_far_from_the_mesh_are_told_what_would_help(
+def test_points_far_from_the_mesh_are_refused_with_what_would_help(
     facert, files, tmp_path, options, units, words
 ):
     mesh, take, points = files

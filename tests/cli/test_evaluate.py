@@ -65,7 +65,7 @@ def test_table_json_and_picture(facert, take, tmp_path):
     assert not list(tmp_path.glob("*.jsonl"))
 
 
-def test_a_method_that_cannot_run_says_so_in_its_row(facert, take):
+def test_a_method_that_cannot_run_has_that_in_its_row(facert, take):
     outcome = facert("eval", take, *QUICK, "--labels", "2,4")
     assert outcome.code == 0, outcome.err
     row = next(line for line in outcome.out.splitlines() if line.split()[:1] == ["2"])

@@ -11,6 +11,7 @@ import typer.main
 from facert.cli.app import app
 from facert.cli.shared.help import examples
 from facert.demo import write_demo
+from facert.settings import DESCRIBED, FINE
 
 GROUP = typer.main.get_command(app)
 COMMANDS = {
@@ -62,6 +63,13 @@ def test_commands_stand_in_panels(facert):
     shown = facert("--help").out
     for panel in ("Pose and suggest", "Train and retarget", "Look and judge", "Without training"):
         assert f"─ {panel} ─" in shown
+
+
+def test_train_has_an_option_for_every_setting_but_the_finest():
+    offered = {param.name for param in COMMANDS["train"].params}
+    groups = {name: about.group for name, (_, about) in DESCRIBED.items()}
+    assert {name for name, group in groups.items() if group != FINE} <= offered
+    assert not {name for name, group in groups.items() if group == FINE} & offered
 
 
 @pytest.mark.parametrize("name", COMMANDS)

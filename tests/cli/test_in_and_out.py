@@ -58,8 +58,8 @@ def test_two_takes_without_a_folder_get_its_option_named(facert, table: Path) ->
     other.write_text(TABLE)
     refused = facert("retarget", table, other)
     assert refused.code == 2
-    told = " ".join(refused.err.split())
-    assert "the file exists. Give another name, or --overwrite; for two takes, --out-dir" in told
+    message = " ".join(refused.err.split())
+    assert "the file exists. Give another name, or --overwrite; for two takes, --out-dir" in message
     assert other.read_text() == TABLE
 
 
@@ -79,5 +79,5 @@ def test_poses_that_a_model_predicted_are_no_labels(facert, make_take, tmp_path:
     assert refused.code == 3
     assert "a model predicted them" in refused.err
     table = tmp_path / "result.csv"
-    assert facert("convert", result, table).code == 0  # the way out that the message tells
+    assert facert("convert", result, table).code == 0  # the way out that the message names
     assert facert("convert", take, tmp_path / "out.h5", "--poses", table).code == 0

@@ -62,7 +62,7 @@ def test_of_a_model_the_settings_are_shown_that_its_method_uses(
     for name in ("latent dim", "inducing", "sigma c"):
         assert (f"settings {name}" in shown) == shared
     facts = json.loads(facert("inspect", model, "--json").out)
-    assert facts["settings"]["latent_dim"] == 2  # programs are told everything
+    assert facts["settings"]["latent_dim"] == 2  # programs get everything
     assert facts["figures"]["seconds"] > 0.0
 
 

@@ -98,7 +98,7 @@ def test_the_first_seconds_may_show_the_actor_at_rest(facert, files, take, tmp_p
     assert np.abs(result.params[later] - plain).mean() < 0.5 * np.abs(plain).mean()
 
 
-def test_a_session_that_ends_before_the_actor_at_rest_is_known_says_so(facert, files, tmp_path):
+def test_a_session_that_ends_before_the_actor_at_rest_is_known_warns(facert, files, tmp_path):
     path, model = files
     done = facert(
         "live", "--in", f"take:{path}", "-m", model, "--speed", 20, "--neutral", 20,
@@ -118,7 +118,7 @@ def test_its_own_input_is_refused_as_an_output(facert, files, tmp_path):
     assert "where facert itself listens" in done.err
 
 
-def test_it_says_where_poses_go(facert, files):
+def test_it_logs_where_poses_go(facert, files):
     done = facert("live", "--in", "livelink:0", "-m", files[1], "--seconds", 0.1,
                   "--out", "osc", "--out", "vmc:localhost")  # fmt: skip
     assert "sends osc to 127.0.0.1:9000" in done.err
@@ -141,7 +141,7 @@ def test_the_summary_is_there_for_programs(facert, files):
     assert 0 < summary["latency_ms"]["median"] <= summary["latency_ms"]["p99"]
 
 
-def test_without_a_sender_it_waits_and_says_so(facert, files):
+def test_without_a_sender_it_waits_and_logs_that(facert, files):
     done = facert("live", "--in", "livelink:0", "-m", files[1], "--out", "vmc", "--seconds", 0.1)
     assert done.code == 0
     assert re.search(r"listens for livelink on 127\.0\.0\.1:\d+ \(this machine alone", done.err)
@@ -149,7 +149,7 @@ def test_without_a_sender_it_waits_and_says_so(facert, files):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "said"),
+    ("arguments", "code", "message"),
     [
         (["--in", "phone", "--out", "vmc"], 2, "one of livelink"),
         (["--in", "livelink:0", "--out", "vmc:99999"], 2, "no port 99999"),
@@ -160,10 +160,10 @@ def test_without_a_sender_it_waits_and_says_so(facert, files):
         (["--in", "livelink:0", "--listen", "nowhere.invalid", "--out", "vmc"], 3, "nowhere"),
     ],
 )
-def test_what_cannot_work_is_refused_before_the_show(facert, files, arguments, code, said):
+def test_what_cannot_work_is_refused_before_the_show(facert, files, arguments, code, message):
     done = facert("live", "-m", files[1], *arguments)
     assert done.code == code
-    assert said in " ".join(done.err.replace("│", " ").split())
+    assert message in " ".join(done.err.replace("│", " ").split())
 
 
 def test_an_output_that_exists_is_refused(facert, files, tmp_path):
@@ -194,7 +194,7 @@ def session(*arguments):
 
 
 def summary(process):
-    """Stop a session as Ctrl-C does, and read what it says."""
+    """Stop a session as Ctrl-C does, and read its summary."""
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
@@ -235,9 +235,9 @@ def test_from_a_phone_made_of_another_library_to_a_character_in_a_third(files, t
                 sender.sendto(raw, ("127.0.0.1", port))
             sent.append(weights)
             time.sleep(0.005)
-        told = summary(process)
-    assert told["bad"] >= 40
-    assert told["mapped"] == len(poses) <= told["received"] <= len(sent)
+        facts = summary(process)
+    assert facts["bad"] >= 40
+    assert facts["mapped"] == len(poses) <= facts["received"] <= len(sent)
     assert set(poses[-1]) == set(take.controls.names)
     assert np.isfinite([list(pose.values()) for pose in poses]).all()
     found = api.read_take(recorded)

@@ -130,7 +130,7 @@ def test_a_glb_of_numbers_without_a_unit_is_warned_of(facert, folder: Path) -> N
     assert "--in-units cm" in done.err
 
 
-def test_what_in_holds_says_nothing_of_a_rig_that_knows_its_unit(facert, folder: Path) -> None:
+def test_what_in_holds_is_not_that_of_a_rig_that_knows_its_unit(facert, folder: Path) -> None:
     rig, out = folder / "unit.h5", folder / "out.glb"
     write_rig(replace(RIG, units="cm"), rig)
     options = ("--rig", rig, "--in-units", "mm", "--in-up-axis", "z", "--up-axis", "y")

@@ -73,7 +73,7 @@ def test_a_frame_of_a_take_is_corrected(facert, files, take, tmp_path):
 
 
 def frame_alone(model, take, frame):
-    """What a model says of a frame without those around it."""
+    """What a model predicts for a frame without those around it."""
     source = replace(take.source, values=take.source.values[[frame]])
     one = replace(take, time=take.time[[frame]], source=source, params=None, animation=None)
     return api.load(model).retarget(one).params[0]
@@ -82,12 +82,12 @@ def frame_alone(model, take, frame):
 def test_a_frame_of_a_result_is_taken_as_it_is(facert, files, take, tmp_path):
     model, _ = files
     result, out = tmp_path / "result.h5", tmp_path / "pose.h5"
-    told = api.load(model).retarget(take)
-    api.write_take(replace(told, params=told.params + 0.01), result)
-    asked = ("--set", f"jawOpen={float(told.params[7, 0] + 0.01)!r}", "-o", out)
+    predicted = api.load(model).retarget(take)
+    api.write_take(replace(predicted, params=predicted.params + 0.01), result)
+    asked = ("--set", f"jawOpen={float(predicted.params[7, 0] + 0.01)!r}", "-o", out)
     done = facert("pose", "-m", model, "--from", f"{result}:7", *asked)
     assert done.code == 0, done.err
-    np.testing.assert_allclose(api.read_take(out).params[0], told.params[7] + 0.01, atol=1e-9)
+    np.testing.assert_allclose(api.read_take(out).params[0], predicted.params[7] + 0.01, atol=1e-9)
 
 
 def test_the_rest_of_a_corrected_frame_can_be_held(facert, files, take, tmp_path):
@@ -121,7 +121,7 @@ def test_a_take_will_do_instead_of_a_model(facert, files, tmp_path, monkeypatch)
         ("jawOpen=wide", 2, "write it as in --set jawOpen=0.3"),
     ],
 )
-def test_what_cannot_be_set_is_said_in_a_line(facert, files, tmp_path, wanted, code, message):
+def test_what_cannot_be_set_is_refused_in_a_line(facert, files, tmp_path, wanted, code, message):
     failed = facert("pose", "-m", files[0], "--set", wanted, "-o", tmp_path / "pose.h5")
     assert failed.code == code
     assert message in " ".join(failed.err.replace("│", " ").split())
@@ -137,7 +137,7 @@ def test_what_cannot_be_set_is_said_in_a_line(facert, files, tmp_path, wanted, c
         ("none.h5:1", 3, "none.h5"),
     ],
 )
-def test_a_frame_that_is_not_there_is_said(
+def test_a_frame_that_is_not_there_is_refused(
     facert, files, tmp_path, monkeypatch, start, code, message
 ):
     monkeypatch.chdir(tmp_path)

@@ -30,7 +30,7 @@ def test_key_frames_make_the_whole_performance(facert, posed, tmp_path):
     assert "RMS against the 49 other frames" in done.out
 
 
-def test_the_posed_frames_are_the_keys_unless_told(facert, make_take, tmp_path):
+def test_the_posed_frames_are_the_keys_by_default(facert, make_take, tmp_path):
     take = make_take(posed=9)
     api.write_take(take, tmp_path / "take.h5")
     done = facert("propagate", tmp_path / "take.h5", tmp_path / "out.csv")
@@ -109,6 +109,6 @@ def test_an_existing_file_is_kept(facert, posed):
 
 def test_help_names_every_method():
     for module, methods in ((propagate, propagation.METHODS), (drive, driving.METHODS)):
-        told = Path(module.__file__).read_text(encoding="utf-8").replace('"\n            "', "")
+        text = Path(module.__file__).read_text(encoding="utf-8").replace('"\n            "', "")
         for name in methods:
-            assert name in told
+            assert name in text

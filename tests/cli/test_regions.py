@@ -42,7 +42,7 @@ def test_inspect_shows_the_regions(facert, take, tmp_path):
     assert re.search(r"regions mouth-and-jaw +\(4\) m0, m1, m2, m3", shown)
 
 
-def test_a_wrong_name_is_told_with_file_and_nearest_name(facert, take, tmp_path):
+def test_a_wrong_name_is_reported_with_file_and_nearest_name(facert, take, tmp_path):
     path = tmp_path / "regions.toml"
     path.write_text('[all]\nmarkers = ["m0", "m1"]\ncontrols = ["jawOpn"]\n')
     outcome = facert("train", take, "--regions", path, "-o", tmp_path / "model.safetensors")
@@ -64,7 +64,7 @@ def test_a_config_file_may_hold_regions(facert, take, tmp_path):
     assert found["all"]["markers"] == ["m0", "m1", "m2"]
 
 
-def test_regions_that_are_no_file_are_told(facert, take):
+def test_regions_that_are_no_file_are_refused(facert, take):
     outcome = facert("train", take, "--regions", "atuo")
     assert outcome.code == 3
     assert "atuo: file: expected an existing file" in outcome.err

@@ -80,7 +80,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "code", "message"), WRONG)
-def test_what_cannot_be_drawn_is_said(facert, folder: Path, arguments, code, message) -> None:
+def test_what_cannot_be_drawn_is_refused(facert, folder: Path, arguments, code, message) -> None:
     named = [folder / one if one.endswith((".h5", ".png", ".gif", ".avi")) else one
              for one in arguments]  # fmt: skip
     outcome = facert("render", *named)

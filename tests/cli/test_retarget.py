@@ -43,7 +43,7 @@ def test_the_result_holds_poses_their_std_and_the_cleaned_source(facert, files, 
     np.testing.assert_allclose(result.source.values, expected.source.values, atol=1e-10)
 
 
-def test_where_the_truth_is_known_errors_are_told_by_part_of_the_face(facert, files, trained):
+def test_where_the_truth_is_known_errors_are_printed_by_part_of_the_face(facert, files, trained):
     take, out, model = files
     done = facert("retarget", take, out, "--model", model)
     params = api.read_take(take).params
@@ -54,7 +54,7 @@ def test_where_the_truth_is_known_errors_are_told_by_part_of_the_face(facert, fi
         assert word in done.out
 
 
-def test_poses_that_it_was_trained_on_tell_no_error(facert, files, make_take):
+def test_poses_that_it_was_trained_on_give_no_error(facert, files, make_take):
     take, out, model = files
     api.write_take(arkit(make_take()), take, overwrite=True)
     done = facert("retarget", take, out, "--model", model)
@@ -87,7 +87,7 @@ def test_a_truth_with_another_control_is_compared_in_those_that_are_shared(
     take, out, model = files
     target = arkit(make_take(posed=60, seed=5))
     names = target.controls.names
-    for changed, told in (
+    for changed, message in (
         ((*names, "tongueOut"), "not compared: tongueOut (only in the truth)"),
         (names[1:], f"not compared: {names[0]} (only in the result)"),
     ):
@@ -100,7 +100,7 @@ def test_a_truth_with_another_control_is_compared_in_those_that_are_shared(
         done = facert("retarget", take, out, "--model", model, "--overwrite")
         assert done.code == 0, done.err
         assert "RMS against" in done.out
-        assert told in done.err
+        assert message in done.err
 
 
 @pytest.mark.parametrize("ending", ["csv", "livelink.csv"])
@@ -237,7 +237,7 @@ def test_controls_neutral_and_switches_are_passed_on(facert, files, tmp_path):
     ("text", "word"),
     [("[jawOpne]\ngain = 1.0\n", "jawOpen"), ("gain = 1.0\n", "table"), ("[", "TOML")],
 )
-def test_a_bad_file_of_controls_is_told(facert, files, tmp_path, text, word):
+def test_a_bad_file_of_controls_is_refused(facert, files, tmp_path, text, word):
     take, out, model = files
     (tmp_path / "controls.toml").write_text(text)
     done = facert("retarget", take, out, "-m", model, "--controls", tmp_path / "controls.toml")

@@ -52,7 +52,7 @@ def test_stable_markers_are_found_automatically(facert, files):
     assert "stable markers: m0, m1, m2, m3, m4\n" in done.out
 
 
-def test_bad_markers_are_not_believed_unless_asked_for(facert, files):
+def test_bad_markers_are_not_observed_unless_asked_for(facert, files):
     take, _, moved, output = files
     moved[30:50, 1] = 0.0
     write(take, moved)
@@ -64,7 +64,7 @@ def test_bad_markers_are_not_believed_unless_asked_for(facert, files):
     assert read_take(output).source.valid.all()
 
 
-def test_frames_that_show_too_few_are_told(facert, files):
+def test_frames_that_show_too_few_are_counted(facert, files):
     take, _, moved, output = files
     moved[30:34, :3] = np.nan
     write(take, moved)

@@ -84,7 +84,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("options", "code", "message"), WRONG)
-def test_what_cannot_be_done_is_said(facert, take, tmp_path, options, code, message) -> None:
+def test_what_cannot_be_done_is_refused(facert, take, tmp_path, options, code, message) -> None:
     outcome = facert("suggest", tmp_path / "take.h5", *options)
     assert outcome.code == code
     assert message in " ".join(outcome.err.replace("│", " ").split())

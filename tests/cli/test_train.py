@@ -44,7 +44,7 @@ def test_a_model_is_written_and_a_table_of_how_it_went(facert, take, model):
     assert "warning" not in done.err
 
 
-def test_of_a_shared_model_the_table_tells_how_the_search_ended(facert, take, model):
+def test_of_a_shared_model_the_table_shows_how_the_search_ended(facert, take, model):
     done = facert("train", take, "-o", model, *QUICK, *SHARED)
     assert done.code == 0
     for word in ("objective", "iterations", "converged", "theta1"):
@@ -182,7 +182,9 @@ def idle(options):
     return f"warning: auto learns in one go: nothing to do for {options}"
 
 
-def test_a_method_that_learns_in_one_go_says_what_it_has_no_use_for(facert, take, model, tmp_path):
+def test_a_method_that_learns_in_one_go_warns_of_what_it_has_no_use_for(
+    facert, take, model, tmp_path
+):
     curve = tmp_path / "curve.csv"
     done = facert("train", take, "-o", model, "--log", curve, "--resume")
     assert done.code == 0

@@ -1,4 +1,4 @@
-"""``facert train`` says what it has no use for."""
+"""``facert train`` warns of what it has no use for."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def _take(make_take, tmp_path: Path) -> Path:
     return tmp_path / "take.h5"
 
 
-def test_settings_of_the_shared_models_are_told_in_one_line_to_others(facert, take: Path) -> None:
+def test_settings_of_the_shared_models_are_named_in_one_line_for_others(facert, take: Path) -> None:
     config = take.with_name("config.toml")
     config.write_text("tolerance = 1e-3\n")
     given = ("--latent-dim", 4, "--optimizer", "scg", "--config", config)
     done = facert("train", take, "-o", take.with_name("a.safetensors"), "--method", "ridge", *given)
     assert done.code == 0
-    told = "ridge does not use latent_dim, optimizer, tolerance: settings of the shared models"
-    assert done.err.count(told) == done.err.count("latent_dim") == 1
+    warning = "ridge does not use latent_dim, optimizer, tolerance: settings of the shared models"
+    assert done.err.count(warning) == done.err.count("latent_dim") == 1
 
 
 def test_settings_that_are_used_need_no_word(facert, take: Path) -> None:

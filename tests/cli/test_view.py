@@ -20,7 +20,7 @@ READY = re.compile(r"http://127\.0\.0\.1:\d+")
 
 
 def ended(*arguments: object) -> tuple[str, str, int]:
-    """Serve a page until it answers, press Ctrl-C: what it served, what it said, how it ended."""
+    """What a page served and printed until Ctrl-C once it answered, and how it ended."""
     command = [sys.executable, "-c", RUN, *map(str, arguments), "--port", "0"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     with subprocess.Popen(
@@ -41,19 +41,19 @@ def ended(*arguments: object) -> tuple[str, str, int]:
 
 def test_a_performance_is_served_on_this_machine_until_ctrl_c() -> None:
     rig, take = DATA / "character.h5", DATA / "performance.h5"
-    served, said, code = ended("view", take, "--rig", rig)
+    served, printed, code = ended("view", take, "--rig", rig)
     assert "<title>" in served
     assert code == 0
-    assert said.splitlines() == [said.strip()]
-    assert "Ctrl-C" in said
+    assert printed.splitlines() == [printed.strip()]
+    assert "Ctrl-C" in printed
 
 
 def test_posing_begins_without_a_model_and_leaves_no_file_unasked(tmp_path) -> None:
     take = tmp_path / "take.h5"
     take.write_bytes((DATA / "performance.h5").read_bytes())
     options = ("--take", take, "--rig", DATA / "character.h5")
-    _, said, code = ended("pose", "--view", *options)
-    assert code == 0, said
+    _, printed, code = ended("pose", "--view", *options)
+    assert code == 0, printed
     assert list(tmp_path.iterdir()) == [take]
 
 
@@ -72,7 +72,7 @@ def test_posing_begins_without_a_model_and_leaves_no_file_unasked(tmp_path) -> N
         (("pose", "--view", "--rig", DATA / "character.h5", "-o", "a.csv"), 3, ".h5"),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_a_line(
+def test_what_cannot_be_shown_is_refused_in_a_line(
     facert, tmp_path, monkeypatch, arguments, code, message
 ) -> None:
     monkeypatch.chdir(tmp_path)

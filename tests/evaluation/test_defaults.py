@@ -76,7 +76,7 @@ def test_a_sparsely_posed_take_is_learned_from_all_its_frames_and_poses_of_label
     assert np.isfinite(outcome.scores.rms)
 
 
-def test_too_few_posed_frames_are_told_with_what_to_do(make, make_take) -> None:
+def test_too_few_posed_frames_are_refused_with_what_to_do(make, make_take) -> None:
     problem = make(make_take(frames=50, posed=3, animation=0))
     with pytest.raises(InputError, match=r"4 posed frames .* found 3, .* facert suggest"):
         default_labels(problem, 40)

@@ -21,7 +21,7 @@ def test_rms_is_over_everything():
     assert rms(np.array([[3.0, 0.0], [0.0, -4.0]])) == 2.5
 
 
-def test_errors_are_told_in_all_and_by_part_of_the_face():
+def test_errors_are_given_in_all_and_by_part_of_the_face():
     truth = take(np.zeros((2, 3)))
     result = take(np.array([[3.0, 0.0, 0.0], [3.0, 1.0, 1.0]]))
     comparison = compare(truth, result)
@@ -43,7 +43,7 @@ def test_controls_are_compared_by_name():
     assert compare(take(params), turned).rms == 0.0
 
 
-def test_there_is_nothing_to_tell_without_truth_or_with_other_controls():
+def test_there_is_nothing_to_compare_without_truth_or_with_other_controls():
     result = take(np.zeros((2, 3)))
     assert compare(replace(result, params=None), result) is None
     assert compare(take(np.full((2, 3), np.nan)), result) is None

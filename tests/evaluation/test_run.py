@@ -53,7 +53,7 @@ def test_labels_and_unlabelled_data_of_the_draw_are_all_used(make, quick):
     assert [*counts, figures["unlabelled poses"]] == [8, 10, 10]
 
 
-def test_a_rig_tells_errors_of_vertices(make_take, quick):
+def test_a_rig_gives_errors_of_vertices(make_take, quick):
     take = make_take(frames=60, posed=60, animation=0)
     shapes = np.random.default_rng(0).normal(size=(4, 7, 3))
     rig = Rig(np.zeros((7, 3)), shapes, take.controls.names, np.array([[0, 1, 2]]))
@@ -62,7 +62,7 @@ def test_a_rig_tells_errors_of_vertices(make_take, quick):
     assert 0 < found.vertex_rms < found.vertex_p95
 
 
-def test_a_method_that_cannot_run_says_why_and_the_others_go_on(make, quick):
+def test_a_method_that_cannot_run_gives_the_reason_and_the_others_go_on(make, quick):
     grid = Grid(("ridge",), labels=(2, 5), unlabelled=(5,), repeats=1)
     few, enough = run(make(), grid, quick)
     assert few.scores is None
@@ -70,7 +70,7 @@ def test_a_method_that_cannot_run_says_why_and_the_others_go_on(make, quick):
     assert enough.scores is not None
 
 
-def test_an_error_that_nobody_foresaw_fails_its_cell_and_is_tried_again(
+def test_an_unexpected_error_fails_its_cell_and_is_tried_again(
     make, quick, tmp_path, caplog, monkeypatch
 ):
     monkeypatch.setitem(REGISTRY, "broken", ("linear", "NoSuchClass"))
@@ -93,7 +93,7 @@ def test_both_halves_of_a_split_by_blocks_must_do(make, make_take, quick):
         next(run(problem, grid, quick))
 
 
-def test_too_short_a_take_is_told_before_anything_runs(make, quick, tmp_path):
+def test_too_short_a_take_is_refused_before_anything_runs(make, quick, tmp_path):
     journal = Journal(tmp_path / "cells.jsonl", "")
     with pytest.raises(InputError, match="fewer labels"):
         next(run(make(), Grid(("ridge",), (5, 110), (10,), 1), quick, journal=journal))

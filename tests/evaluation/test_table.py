@@ -6,7 +6,7 @@ from facert.evaluation.cells import Cell, Outcome
 from facert.evaluation.figures import panels, plot_errors
 from facert.evaluation.metrics import Scores
 from facert.evaluation.protocol import Protocol
-from facert.evaluation.table import best, summarise
+from facert.evaluation.table import best, columns_of, summarise
 
 
 def outcome(method, labels, repeat, rms, unlabelled=100):
@@ -26,6 +26,17 @@ def table(errors, unlabelled=100):
 
 def failed(method, labels, repeat=0):
     return Outcome(Cell(method, labels, 100, repeat), failure="too few labels")
+
+
+def test_columns_hold_what_rows_have_to_show():
+    ran = summarise(table({"a": {10: [0.2, 0.4]}}), Protocol())
+    shown = {column.title: column.text(ran[0]) for column in columns_of(ran)}
+    assert not {"vertex", "95 %", "draws"} & shown.keys()
+    assert (shown["RMS"], shown["of range"]) == ("0.3000", "60.0%")
+    partly = summarise([*table({"a": {10: [0.2]}}), failed("a", 10, 1)], Protocol())
+    assert {column.title: column.text(partly[0]) for column in columns_of(partly)}["draws"] == "1"
+    never = summarise([failed("a", 10)], Protocol())
+    assert [column.text(never[0]) for column in columns_of(never)] == ["a", "cannot run"]
 
 
 def test_rows_hold_means_standard_errors_and_ratios():
@@ -63,19 +74,19 @@ def test_advice_names_the_best_method_and_what_more_labels_bring():
     assert "40 labels would take off another 50%." in line
 
 
-def test_advice_from_few_draws_says_so():
+def test_advice_from_few_draws_warns_of_it():
     few, many = (advise(table({"a": {10: [0.2] * draws}})) for draws in (4, 5))
     assert few.endswith("Draws are few: see --repeats.")
     assert "few" not in many
 
 
-def test_advice_tells_what_does_as_well():
+def test_advice_names_what_does_as_well():
     line = advise(table({"a": {10: [0.1, 0.2]}, "b": {10: [0.21, 0.1]}, "c": {10: [0.3, 0.3]}}))
     assert "Use a for this take (b within one standard error of it)" in line
     assert "evaluate a range" in line
 
 
-def test_advice_tells_when_labels_are_enough():
+def test_advice_shows_when_labels_are_enough():
     assert "bring little" in advise(table({"a": {10: [0.1], 20: [0.099]}}))
 
 

@@ -163,9 +163,9 @@ def _run(
         if journal is not None:
             console.log.warning("the same command continues from %s", journal.path)
         raise
-    unforeseen = sum(bool(outcome.details) for outcome in done)
-    if unforeseen:
-        cells = plural(unforeseen, "cell")
+    unexpected = sum(bool(outcome.details) for outcome in done)
+    if unexpected:
+        cells = plural(unexpected, "cell")
         console.log.warning("%s failed unexpectedly: facert -v eval shows where", cells)
     return done
 

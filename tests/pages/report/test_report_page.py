@@ -107,13 +107,13 @@ def test_the_same_results_give_the_same_page(evaluation) -> None:
     assert one == other
 
 
-def test_tables_mark_the_best_and_tell_who_could_not_run(evaluation) -> None:
+def test_tables_mark_the_best_and_name_who_could_not_run(evaluation) -> None:
     section = read_evaluation(evaluation)
     assert [table.caption.split(" ")[0] for table in section.tables] == ["5", "10"]
     for table in section.tables:
         (best,) = table.best
         assert table.rows[best][0] == "gpr"
-        assert "vertex" not in table.columns  # nothing to say
+        assert "vertex" not in table.columns  # nothing to show
         assert all(len(cells) == len(table.columns) for cells in table.rows)
     assert "svr: too few" in section.text
 
@@ -158,7 +158,7 @@ def test_a_file_that_is_no_json_is_refused(tmp_path, text) -> None:
         read_evaluation(path)
 
 
-def test_errors_are_told_by_region_and_in_all(performance) -> None:
+def test_errors_are_given_by_region_and_in_all(performance) -> None:
     result, truth, rig = performance
     section = performance_section("a", result, rig, truth)
     (table,) = section.tables
