@@ -108,12 +108,12 @@ def grid_patch(
     colours: ArrayLike,
     tissue: Tissue = Tissue.SKIN,
     *,
-    order: slice = slice(None),
+    order: slice | tuple[slice, slice] = np.s_[:],
     closed: bool = False,
 ) -> Patch:
     """A patch of a grid of points (R, n, 3), in one colour or one a vertex; see `strips`.
 
-    `order` takes the rows backwards where they run outwards.
+    `order` takes rows or columns backwards where they run the other way.
     """
     vertices = points.reshape(-1, 3)
     grid = np.arange(len(vertices)).reshape(points.shape[:2])
@@ -199,18 +199,17 @@ def ear(build: Build) -> Patch:
     across, depth = leaf * np.cos(turn), 0.28 * leaf * np.sin(turn)
     hollow = 0.42 * leaf * np.exp(-3 * (across**2 + (level + 0.1) ** 2)) * (depth > 0)
     centre = np.array(shape.root) + np.sin(shape.lean) * length * 0.75 * up
-    vertices = (
+    points = (
         centre
         + width * across[..., None] * back
         + length * (level + 0 * turn)[..., None] * up
         + width * (depth - hollow)[..., None] * front
     )
-    grid = np.arange(rows * sides).reshape(rows, sides)
     right_handed = np.dot(np.cross(back, front), up) > 0
-    faces = strips(grid[:, ::-1] if right_handed else grid, closed=True)
     skin, blush = np.array(build.palette.skin), np.array(build.palette.blush)
     shade = np.clip(hollow * 1.2, 0, 0.8).reshape(-1, 1)
-    return Patch(vertices.reshape(-1, 3), faces, skin + shade * (blush - skin))
+    order = np.s_[:, ::-1] if right_handed else np.s_[:, :]
+    return grid_patch(points, skin + shade * (blush - skin), order=order, closed=True)
 
 
 def hair(build: Build) -> Patch:
@@ -234,4 +233,4 @@ def hair(build: Build) -> Patch:
     height = shape.thickness * np.sqrt(1 - inwards**4) * locks - 0.15 * inwards**6
     vertices = skin + height[..., None] * directions
     vertices[:, [0, -1], 0] = 0
-    return grid_patch(vertices, build.palette.hair, Tissue.SKULL, order=slice(None, None, -1))
+    return grid_patch(vertices, build.palette.hair, Tissue.SKULL, order=np.s_[::-1])
