@@ -27,7 +27,7 @@ which nothing can be computed."""
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """How a source is treated before it is mapped.
+    """Options of cleaning a source before it is mapped.
 
     Parameters
     ----------

@@ -157,7 +157,7 @@ def held_values(markers: FloatArray) -> BoolArray:
 
 
 def _released_far(steps: FloatArray) -> BoolArray:
-    """Which repeats end in a step that is not among the smallest, or never, (T, M)."""
+    """Repeats that end in a step that is not among the smallest, or never, (T, M)."""
     moving = np.where(steps > 0.0, steps, np.nan)
     moves = ~np.isnan(moving).all(axis=0)
     ordinary = np.zeros(steps.shape[1])
@@ -248,7 +248,7 @@ def _crossings(markers: FloatArray) -> list[tuple[int, int, IntArray]]:
 
 
 def _nearest(now: FloatArray, before: FloatArray) -> IntArray:
-    """For each marker in each frame the one that was last seen nearest to it, (T, M)."""
+    """The marker that was last seen nearest to each marker in each frame, (T, M)."""
     result = np.empty(now.shape[:2], dtype=np.int64)
     some = max(DISTANCES_AT_ONCE // now.shape[1] ** 2, 1)
     for start in range(0, len(now), some):
@@ -260,7 +260,7 @@ def _nearest(now: FloatArray, before: FloatArray) -> IntArray:
 
 
 def _last_seen(markers: FloatArray) -> FloatArray:
-    """In each frame the last position that was seen of each marker; NaN before the first."""
+    """The last position seen of each marker at each frame, (T, M, 3); NaN before the first."""
     seen = ~np.isnan(markers[:, :, 0])
     last = np.maximum.accumulate(np.where(seen, np.arange(len(markers))[:, None], 0), axis=0)
     return np.take_along_axis(markers, last[:, :, None], axis=0)
@@ -282,7 +282,7 @@ def _predicted(markers: FloatArray) -> FloatArray:
 
 
 def _off_in_time(markers: FloatArray) -> FloatArray:
-    """How far each position is off a line, and off a cubic, through those around, (T, M)."""
+    """Distance of each position to a line, or a cubic, through those around, (T, M)."""
     frames = len(markers)
     X = interpolated(markers.reshape(frames, -1), np.arange(frames, dtype=np.float64))
     x = _continued(X.reshape(markers.shape))
@@ -293,7 +293,7 @@ def _off_in_time(markers: FloatArray) -> FloatArray:
 
 
 def _continued(x: FloatArray) -> FloatArray:
-    """With two more frames at each end, such that its first and last lie between straight lines."""
+    """The frames with two more at each end, on straight lines with the first and the last."""
     start = [4.0 * x[1] - 3.0 * x[2], 3.0 * x[1] - 2.0 * x[2]]
     end = [3.0 * x[-2] - 2.0 * x[-3], 4.0 * x[-2] - 3.0 * x[-3]]
     return np.concatenate([np.stack(start), x, np.stack(end)])
@@ -306,7 +306,7 @@ def _peaks(off: FloatArray) -> BoolArray:
 
 
 def _off_in_space(markers: FloatArray) -> FloatArray:
-    """How far each position is off what the rest of its frame predicts, (T, M)."""
+    """Distance of each position to its prediction by the rest of its frame, (T, M)."""
     frames, count = markers.shape[:2]
     X = markers.reshape(frames, -1)
     gaussian = _fitted(X)
@@ -318,7 +318,7 @@ def _off_in_space(markers: FloatArray) -> FloatArray:
 
 
 def _total_of_run(values: FloatArray, runs: BoolArray) -> FloatArray:
-    """For each entry the sum over its run of True in time, (T, M)."""
+    """The sum of values over the run of True in time that each entry belongs to, (T, M)."""
     total = np.cumsum(values, axis=0)
     before = np.maximum.accumulate(np.where(runs, 0.0, total), axis=0)
     ends = runs & ~np.concatenate([runs[1:], np.zeros_like(runs[:1])])
@@ -347,7 +347,7 @@ class FaultDetector:
         self._repeats: IntArray = np.zeros(markers, dtype=np.int64)
 
     def step(self, markers: FloatArray) -> BoolArray:
-        """Which markers (M,) of one more frame (M, 3) are bad; NaN: not observed."""
+        """The bad markers (M,) of one more frame (M, 3); NaN: not observed."""
         repeated, last = markers == self._last, self._last
         self._last = np.where(np.isnan(markers), last, markers)
         if markers.all() and not repeated.any():  # as nearly always

@@ -59,12 +59,12 @@ class Stabilised:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the stable markers."""
+        """Names of the stable markers."""
         return tuple(self.take.source.names[index] for index in self.stable)
 
     @property
     def shifts(self) -> FloatArray:
-        """How far the head moved the middle of the stable markers, (T,)."""
+        """Distances by which the head moved the middle of the stable markers, (T,)."""
         middle = np.nanmedian(self.take.source.values[:, self.stable], axis=(0, 1))
         return np.asarray(np.linalg.norm(self.head.apply(middle[None])[:, 0] - middle, axis=1))
 
@@ -162,7 +162,7 @@ def stable_markers(markers: FloatArray) -> IntArray:
 
 
 def _distance_change(markers: FloatArray) -> FloatArray:
-    """How much the distance of each pair changes, (M, M); much for pairs never seen together."""
+    """Change of the distance of each pair, (M, M); the most for pairs never seen together."""
     frames, count = markers.shape[:2]
     some = int(np.clip(PAIRS_AT_ONCE // count**2, FEWEST_FRAMES, MOST_FRAMES))
     few = markers[np.linspace(0, frames - 1, min(some, frames)).round().astype(np.int64)]
@@ -252,7 +252,7 @@ def _pose(motion: RigidMotion, known: BoolArray, reference: int | Literal["mean"
 
 
 def _steady_shape(steady: Source, source: Source, chosen: IntArray) -> FloatArray:
-    """Where a stabilised take has the stable markers of another, (1, S, 3)."""
+    """Positions in a stabilised take of the stable markers of another, (1, S, 3)."""
     names = [source.names[index] for index in chosen]
     places = _markers(steady)[:, match(names, steady.names, "--like")]
     if np.isnan(places).all(axis=0).any():

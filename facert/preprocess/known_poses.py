@@ -61,7 +61,7 @@ def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> Float
 
 
 def pose_bounds(take: Take, posed: FloatArray, rule: LimitRule) -> FloatArray | None:
-    """What poses are clipped to, (P, 2): the take's declared limits, or the range of known poses.
+    """Bounds that poses are clipped to, (P, 2): the take's limits, or the range of known poses.
 
     These are given poses (l, P), as of the labelled frames, and all of the animation.
     """

@@ -26,7 +26,7 @@ FULL = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Takes frames to what the actor would have shown in the recording that was learned from.
+    """A map of frames to what they would have been in the recording that was learned from.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Calibration:
 
     @classmethod
     def of(cls, own: FloatArray, learned: FloatArray, kind: SourceKind) -> Calibration:
-        """From the actor at rest in this and in that recording.
+        """The calibration by the actor at rest in this and in that recording.
 
         Parameters
         ----------
@@ -106,6 +106,6 @@ def median_at_rest(X: FloatArray, scale: float) -> FloatArray:
 
 
 def most_neutral(poses: FloatArray) -> int:
-    """Which of the poses (n, P) moves the character least from all controls at zero."""
+    """The index of the pose, of (n, P), that is nearest to all controls at zero."""
     reach = np.maximum(np.abs(poses).max(axis=0), np.finfo(float).tiny)
     return int(np.square(poses / reach).sum(axis=1).argmin())

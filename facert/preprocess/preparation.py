@@ -175,7 +175,7 @@ def _warn_of_zeros(source: Source) -> None:
 
 
 def _step(prepared: Prepared) -> float:
-    """How far frames move on from one to the next, normalised units."""
+    """The distance from one frame to the next, normalised units."""
     if prepared.estimate is None:
         X = prepared.measured.matrix
         step = largest_step(X, capture_noise(X))

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class SourceColumns:
-    """Where the numbers of a source's frames have the columns that a model knows.
+    """Indices of a model's columns among the numbers of a source's frames.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class SourceLayout:
         return 3 if self.kind == "markers" else 1
 
     def columns(self, names: Sequence[str]) -> SourceColumns:
-        """Where a source with these names has the model's columns.
+        """The model's columns in a source with these names.
 
         A marker that the source lacks is one that was not observed: the job goes on, with a
         warning. Where it has unknown names instead, or lacks most, it is misspelt or another set.

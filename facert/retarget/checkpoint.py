@@ -23,7 +23,7 @@ _MEMORY = "memory."
 
 
 def checkpoint_path(model: Path) -> Path:
-    """Where the checkpoint of a model file in training lies: beside it."""
+    """The path of the checkpoint of a model file in training, beside it."""
     return model.with_suffix(".checkpoint.safetensors")
 
 
@@ -162,12 +162,12 @@ class Monitors(Monitor):
         return next((progress for progress in found if progress), None)
 
     def iteration(self, state: State) -> None:
-        """Tell every part."""
+        """Pass it on to every part."""
         for part in self.parts:
             part.iteration(state)
 
     def checkpoint(self, progress: Progress) -> None:
-        """Tell every part."""
+        """Pass it on to every part."""
         for part in self.parts:
             part.checkpoint(progress)
 

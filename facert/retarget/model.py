@@ -81,17 +81,17 @@ class TrainedModel:
 
     @property
     def source_names(self) -> tuple[str, ...]:
-        """Of the markers or weights that the model knows."""
+        """Names of the markers or weights that the model knows."""
         return self.layout.names
 
     @property
     def settings(self) -> Settings:
-        """What it was trained with, defaults filled in."""
+        """The settings it was trained with, defaults filled in."""
         return self.method.settings
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What the model holds and how it was made, as plain values."""
+        """Names, units, settings and figures of the model, as plain values."""
         return {
             "source_kind": self.source_kind,
             "source_names": list(self.source_names),

@@ -66,7 +66,7 @@ def relative_residuals(
 
 
 def novelty_warning(residuals: FloatArray, names: Sequence[str]) -> str | None:
-    """What people are warned of, from `relative_residuals` (T, n); None where little is new."""
+    """The warning by `relative_residuals` (T, n); None where little is new."""
     new = np.sqrt(np.mean(residuals**2, axis=1)) > NEW
     if new.mean() < LEAST_SHARE:
         return None

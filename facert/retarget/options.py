@@ -88,7 +88,7 @@ class Adjustments:
 
 @dataclass(frozen=True)
 class RetargetOptions(SourceOptions):
-    """What a person may choose for each take, whatever the model: `SourceOptions`, and controls.
+    """Options of retargeting a take, whatever the model: those of its source, and of controls.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ AS_IT_IS = RetargetOptions(detect=False, smooth=False)
 
 
 class PoseScale:
-    """From normalised poses to a character's controls, of one frame or of many.
+    """The map from normalised poses to a character's controls, of one frame or of many.
 
     A pose is brought to the controls' units, clipped to the model's bounds, multiplied by the gain
     and clipped to the limits; with the bounds times the gain, that is one product, one sum and one

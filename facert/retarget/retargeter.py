@@ -94,7 +94,7 @@ class Retargeter(TrainedModel):
         options: RetargetOptions | None = None,
         rest: FloatArray | None = None,
     ) -> RetargetStream:
-        """Begin to retarget a live source; see `RetargetStream`."""
+        """A stream that retargets a live source; see `RetargetStream`."""
         return RetargetStream(self, names, fps, options, rest)
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:

@@ -124,7 +124,7 @@ class RetargetStream:
             self._filter.set_noise(self._noise)
 
     def prepare(self) -> None:
-        """Do what need not wait for the next frame; `step` does it where nobody did."""
+        """Compute all that need not wait for the next frame; else `step` does it."""
         if self._filter is None:
             return
         if self._meter is not None and self._pending is not None:
@@ -205,7 +205,7 @@ class RetargetStream:
 def _filter(
     model: TrainedModel, fps: float | None, options: RetargetOptions
 ) -> MotionFilter | None:
-    """What takes noise out, if it is wanted and the model knows how its source moves."""
+    """The filter of the source; None if it is not wanted, or the model has no motion."""
     motion = model.motion
     if motion is None or not options.smooth:
         return None

@@ -119,7 +119,7 @@ def _noise_figures(found: MotionEstimate | None, unit: str) -> dict[str, Any]:
 
 
 def _figures(learned: Learned, labels: int, target_units: Normalisation) -> dict[str, Any]:
-    """How training went, errors in the controls' units."""
+    """Figures of the training for people, errors in the controls' units."""
     figures: dict[str, Any] = {"labelled frames": labels, "seconds": learned.seconds}
     result = learned.report.result
     if result is not None:

@@ -71,7 +71,7 @@ class MotionFilter:
         self._was_off: Seen = None
 
     def set_noise(self, sigma: float) -> None:
-        """Go on with another noise."""
+        """Change the noise."""
         self._shared.set_noise(self._motion.seen_with(sigma))
         self._rest.set_noise(sigma**2)
         self._looked = False
@@ -159,7 +159,7 @@ class _FactorFilter:
         return self._last.variance
 
     def set_noise(self, factors: MotionFactors) -> None:
-        """Go on with another noise."""
+        """Change the noise."""
         self._factors, self._last = factors, replace(self._last, settled=False)
 
     def look_ahead(self) -> None:
@@ -204,7 +204,7 @@ class _SeriesFilter:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with the prior covariance again, at the present values and at rest."""
+        """Return to the prior covariance, at the present values and at rest."""
         self._m = self._m * [[1.0], [0.0]]
         # Of the latest frame: the covariance before it was seen, and the gain.
         self._P, self._gain = self._chain.prior, np.zeros_like(self._m)
@@ -228,7 +228,7 @@ class _SeriesFilter:
         return np.asarray(self._P[0] * (1.0 - self._gain[0]))
 
     def set_noise(self, noise: float) -> None:
-        """Go on with another variance of the noise."""
+        """Change the variance of the noise."""
         before, self._noise = self._noise, noise
         self._predicted = self._predicted + (noise - before)
         if not before / OTHER_NOISE < noise < before * OTHER_NOISE:

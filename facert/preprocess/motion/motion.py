@@ -42,7 +42,7 @@ LEAST_VARIANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Motion(ArrayGroup):
-    """How normalised frames move, learned from a take.
+    """The motion of normalised frames, learned from a take.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Motion(ArrayGroup):
         return float(self.clock[1])
 
     def every(self, seconds: float) -> Motion:
-        """For frames that come so far apart in time."""
+        """The motion of frames that come so many seconds apart."""
         ratio = seconds / self.clock[0]
         return replace(
             self,
@@ -80,7 +80,7 @@ class Motion(ArrayGroup):
 
     @classmethod
     def learned(cls, X: FloatArray, sigma: float, seconds: float = 1.0) -> Motion:
-        """From a take.
+        """The motion of a take.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ def _rest(left: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _mean_square(values: FloatArray) -> FloatArray:
-    """Of the numbers in each column of (..., d), (d,); NaN where there is none."""
+    """Mean square of each column of (..., d), (d,); NaN where all is NaN."""
     known = ~np.isnan(values)
     count = known.sum(axis=(0, 1))
     total = (np.where(known, values, 0.0) ** 2).sum(axis=(0, 1))

@@ -44,7 +44,7 @@ class MotionFactors(ArrayGroup):
 
     @classmethod
     def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> MotionFactors:
-        """From frames with gaps.
+        """The factors of frames with gaps.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class MotionFactors(ArrayGroup):
         return MotionFactors(self.mean, self.weights, np.maximum(self.noise + more, least))
 
     def scaled(self, deviation: FloatArray) -> MotionFactors:
-        """For factors measured in units of their standard deviation, (q,)."""
+        """The same for factors in units of their standard deviation, (q,)."""
         return MotionFactors(self.mean, self.weights * deviation, self.noise)
 
     def _turned(self) -> MotionFactors:

@@ -36,7 +36,7 @@ def decay(correlation: FloatArray) -> FloatArray:
 
 
 def transition(a: FloatArray) -> FloatArray:
-    """How value and velocity of each process (both of unit variance) go on, (2, 2, q)."""
+    """Transition of value and velocity of each process, both of unit variance, (2, 2, q)."""
     return np.asarray(np.exp(-a) * np.array([[1.0 + a, a], [-a, 1.0 - a]]))
 
 
@@ -142,7 +142,7 @@ def _forward(
 
 
 def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
-    """Which frames (T, ...) are just like the one before, (T,)."""
+    """Frames (T, ...) that equal the one before, (T,)."""
     same = (frames[1:] == frames[:-1]).all(axis=tuple(range(1, frames.ndim)))
     return np.concatenate([[False], same])
 
@@ -287,7 +287,7 @@ def factor_chain(a: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class SeriesChain(NamedTuple):
-    """How series and their covariances (3, d), of value, value with velocity and velocity, go on.
+    """Transition of series and their covariances (3, d): value, value with velocity, velocity.
 
     F (2, 2, d) and forward (3, 3, d) take means and covariances one frame on, to which the noise
     of the transition adds drift (3, d); before the first frame they are prior.
