@@ -37,12 +37,13 @@ from facert.models.device import find_device
 from facert.models.gp.posterior import Predictor
 from facert.models.gp.sparse import ApproximationName
 from facert.models.gplvm.fitting import train
+from facert.models.gplvm.frame_mapping import FrameMapping
 from facert.models.gplvm.initial_latents import align, principal_components
 from facert.models.gplvm.lle import constraint_matrix, view_rows
 from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.gplvm.source_mapping import Mapped, Observation, SourceMapping
 from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
-from facert.models.gplvm.staging import Core, Start
+from facert.models.gplvm.staging import Core, TrainedViews
 from facert.models.gplvm.target_mapping import map_to_target
 from facert.models.kernels import kernel_class
 from facert.models.optim.lbfgs import LBFGS
@@ -86,7 +87,7 @@ class SemiSupervisedSGPLVM:
             kernel_class(settings.source_kernel, "source_kernel"),
             kernel_class(settings.target_kernel, "target_kernel"),
         )
-        self._begin: Start | None = None
+        self._begin: TrainedViews | None = None
 
     @property
     def dimensions(self) -> tuple[int, int]:
@@ -96,7 +97,7 @@ class SemiSupervisedSGPLVM:
     def begin_at(self, other: Method, source: Normalisation, target: Normalisation) -> None:
         """Let `fit` begin at latents and kernels of a trained model; see `WarmStart.begin_at`."""
         assert isinstance(other, SemiSupervisedSGPLVM)
-        self._begin = Start(other.source_, other.target_, source, target)
+        self._begin = TrainedViews(other.source_, other.target_, source, target)
 
     def fit(
         self, labelled: Labelled, unlabelled: Unlabelled, monitor: Monitor | None = None
@@ -138,7 +139,7 @@ class SemiSupervisedSGPLVM:
         if found.type == "cpu":
             return self
         there = copy(self)
-        there.mapping_ = SourceMapping(self.source_, found)
+        there.mapping_ = SourceMapping(self.source_.on(found))
         there.to_poses_ = partial(map_to_target, self.target_.on(found))
         return there
 
@@ -168,7 +169,8 @@ class SemiSupervisedSGPLVM:
 
     def _set_views(self, source: Predictor, target: Predictor) -> None:
         self.source_, self.target_ = source, target
-        self.mapping_ = SourceMapping(source)
+        self.frame_mapping_ = FrameMapping(source)
+        self.mapping_: SourceMapping = self.frame_mapping_
         self.to_poses_ = partial(map_to_target, target)
 
     def _observed(self, frames: FloatArray, input_variance: FloatArray | None) -> Observation:
@@ -225,13 +227,13 @@ class SemiSupervisedSGPLVM:
                 inducing = Z[view[1][inducing_rows(len(view[1]), labelled, self.settings.inducing)]]
                 yield SparseView(*view, inducing, row_weights(len(view[1]), labelled), chosen)
 
-    def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int) -> Start:
+    def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int) -> TrainedViews:
         core = Core.of(X, Y, labelled)
         X, Y = X[core.rows_x], Y[core.rows_y]
         small = self._module(X, Y, core.labelled, "exact").to(find_device(self.settings.device))
         if self._train(small, "", Monitor()).status == "interrupted":  # there is no model to keep
             raise KeyboardInterrupt
-        return Start.at(*small.posteriors())
+        return TrainedViews.at(*small.posteriors())
 
     def _likelihood(self, X: FloatArray, Y: FloatArray, labelled: int) -> ChosenLikelihood:
         """The setting; where it is ``"auto"``, exact while there is no more than a core."""
@@ -279,7 +281,7 @@ class _SharedStream:
     def step(self, frame: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map one more frame (1, d_x)."""
         observed = self.method._observed(frame, input_variance)
-        mapping = self.method.mapping_
+        mapping = self.method.frame_mapping_
         if self.previous is None:
             self.previous = mapping.solve(observed)
         else:

@@ -133,7 +133,7 @@ def test_batch_stream_and_device_map_alike(kernel, likelihood):
     batch, there = made.predict(frames), copy(made)
     there._set_views(made.source_, made.target_)
     device = torch.device("cpu")
-    there.mapping_ = SourceMapping(made.source_, device)
+    there.mapping_ = SourceMapping(made.source_.on(device))
     there.to_poses_ = partial(map_to_target, made.target_.on(device))
     on_device, stream = there.predict(frames), made.stream()
     for row in range(len(frames)):

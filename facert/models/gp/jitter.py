@@ -6,8 +6,9 @@ For torch's tensors see `facert.models.gp.cholesky`, which climbs the same ladde
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from scipy.linalg.blas import dtrmm
@@ -16,43 +17,46 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 from facert.data.arrays import FloatArray
 from facert.errors import NumericalError
 
+if TYPE_CHECKING:  # importing it takes seconds
+    from torch import Tensor
+
 log = logging.getLogger(__name__)
 
-# Relative to the mean of the diagonal. The first rung is the matrix as it is.
-JITTER_LADDER = (0.0, 1e-12, 1e-10, 1e-8, 1e-6)
+JITTER_LADDER = (1e-12, 1e-10, 1e-8, 1e-6)  # relative to the mean of the diagonal
 # Triangles of sizes between are inverted by halves: LAPACK in one go takes up to twice as long.
 SMALL, LARGE = 64, 600
 
-T = TypeVar("T")
+Matrix = TypeVar("Matrix", FloatArray, "Tensor")
 
 
-def climb(factorise: Callable[[float], T | None], size: int, scale: float) -> T:
-    """The factor at the first rung that gives one.
+def climb(K: Matrix, factorise: Callable[[float], Matrix | None]) -> Matrix:
+    """The factor at the first rung of the ladder that gives one.
 
     Parameters
     ----------
+    K : array or Tensor, shape (n, n)
     factorise : callable
-        Factor of the matrix with so much on its diagonal; None if that is not positive definite.
-    size : int
-        Rows of the matrix.
-    scale : float
-        Mean of its diagonal.
+        Factor of K with so much on its diagonal; None if that is not positive definite.
 
     Raises
     ------
     NumericalError
-        When no rung helps.
+        When K holds NaN or infinity, or no rung helps.
     """
+    factor = factorise(0.0)
+    if factor is not None:
+        return factor
+    # Jitter cannot mend NaN, so look for it before the ladder is tried.
+    if not math.isfinite(float(abs(K).max())):
+        raise NumericalError("the kernel matrix holds NaN or infinity")
+    n, scale = len(K), float(K.diagonal().mean())
     for rung in JITTER_LADDER:
         factor = factorise(rung * scale)
         if factor is not None:
-            if rung:
-                log.warning(
-                    "added %.1e to the diagonal of a %d x %d kernel", rung * scale, size, size
-                )
+            log.warning("added %.1e to the diagonal of a %d x %d kernel", rung * scale, n, n)
             return factor
     raise NumericalError(
-        f"a {size} x {size} kernel matrix is not positive definite, even with "
+        f"a {n} x {n} kernel matrix is not positive definite, even with "
         f"{JITTER_LADDER[-1] * scale:.1e} on its diagonal: raise the noise floor"
     )
 
@@ -73,21 +77,15 @@ def lower_factor(K: FloatArray) -> FloatArray:
     Raises
     ------
     NumericalError
-        When the matrix holds NaN or infinity, or no rung of the ladder helps.
+        See `climb`.
     """
-    L, failed = dpotrf(K, lower=1, clean=0)
-    # LAPACK takes infinity on the diagonal for positive.
-    if not failed and np.isfinite(L.diagonal()).all():
-        return np.asarray(L)
-    # Jitter cannot mend NaN, so look for it before the ladder is tried.
-    if not np.isfinite(K).all():
-        raise NumericalError("the kernel matrix holds NaN or infinity")
 
     def factorise(jitter: float) -> FloatArray | None:
-        L, failed = dpotrf(K + jitter * np.eye(len(K)), lower=1, clean=0)
-        return None if failed else np.asarray(L)
+        L, failed = dpotrf(K + jitter * np.eye(len(K)) if jitter else K, lower=1, clean=0)
+        # LAPACK takes infinity on the diagonal for positive.
+        return L if not failed and np.isfinite(L.diagonal()).all() else None
 
-    return climb(factorise, len(K), float(K.diagonal().mean()))
+    return climb(K, factorise)
 
 
 def inverted(L: FloatArray) -> FloatArray:

@@ -24,72 +24,17 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from facert.data.arrays import FloatArray
-from facert.models.gp.posterior import Predictor
+from facert.models.gplvm.source_mapping import (
+    DECREMENT,
+    ROUNDING,
+    LinearisedView,
+    Mapped,
+    Observation,
+    SourceMapping,
+    ViewPoint,
+)
 
 MOST_STEPS = 12
-# Newton decrement (nats) below which one more step solves a frame, without another Hessian: what
-# that leaves is of the order of its square. The energy is a log-probability.
-DECREMENT = 1e-4
-# Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
-ROUNDING = 1e-7
-
-
-class ViewPoint(NamedTuple):
-    """Mean and variance of the source view at z (q,), whatever is observed.
-
-    Parameters
-    ----------
-    z : array, shape (q,)
-    offsets : array, shape (q, N)
-        z - z_i of every position.
-    squared, k : arrays, shape (N,)
-        |z - z_i|², and the kernel there.
-    whitened : array, shape (N,)
-        T k.
-    mean : array, shape (d_x,)
-        μ.
-    s : float
-        σ_p².
-    """
-
-    z: FloatArray
-    offsets: FloatArray
-    squared: FloatArray
-    k: FloatArray
-    whitened: FloatArray
-    mean: FloatArray
-    s: float
-
-
-class LinearisedView(NamedTuple):
-    """A point with its slopes [H | J], (q, N + d_x): most of the work of a step."""
-
-    point: ViewPoint
-    slopes: FloatArray
-
-
-class Descent(NamedTuple):
-    """Where the search for one frame ended.
-
-    Parameters
-    ----------
-    z : array, shape (q,)
-        z*.
-    x : array, shape (d_x,)
-        x*.
-    hessian : array, shape (q, q)
-        ∇²F where the last step, which is tiny, was taken from.
-    energy : float
-        F(z*).
-    linearised : LinearisedView
-        The view there: the next frame can begin with it.
-    """
-
-    z: FloatArray
-    x: FloatArray
-    hessian: FloatArray
-    energy: float
-    linearised: LinearisedView
 
 
 class _DataTerm(NamedTuple):
@@ -100,33 +45,57 @@ class _DataTerm(NamedTuple):
     wr: FloatArray
 
 
-class FrameMapping:
-    """Follows single frames in the latent space of a trained source view.
+class FrameMapping(SourceMapping):
+    """Source mapping that follows single frames as well.
 
     Parameters
     ----------
-    posterior : Predictor
-        The source view, X given Z.
+    view : Predictor
+        The source view, X given Z, not on a device: single frames are soon done.
     """
 
-    def __init__(self, posterior: Predictor) -> None:
-        self._kernel = posterior.kernel
-        self._Z_T, self._identity = posterior.Z_T, posterior.identity
-        self._stacked = posterior.stacked
+    def follow(
+        self,
+        observed: Observation,
+        previous: FloatArray,
+        linearised: LinearisedView | None = None,
+    ) -> Mapped:
+        """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
+
+        Parameters
+        ----------
+        observed : Observation
+            One frame.
+        previous : array, shape (1, q)
+            z of the frame before.
+        linearised : LinearisedView, optional
+            `Mapped.linearised` of that frame, as good as its z and quicker.
+        """
+        b, R = observed.mean[0], observed.variance[0]
+        (energies,) = self._train_energies(observed.mean, observed.variance)
+        least = energies.argmin()
+        at = linearised or self.linearise(previous[0])
+        found = self.descend(at, b, R, float(energies[least]))
+        if found is None:
+            nearest = self.view.Z[least]
+            if self.frame_energy(nearest, b, R) < self.frame_energy(at.point.z, b, R):
+                at = self.linearise(nearest)
+            found = self.descend(at, b, R)
+        return self.solve(observed, previous) if found is None else found
 
     def descend(
         self, at: LinearisedView, b: FloatArray, R: FloatArray, energy: float = math.inf
-    ) -> Descent | None:
+    ) -> Mapped | None:
         """Newton's method for the frame b (d_x,) seen with variance R (d_x,).
 
         Returns
         -------
-        Descent, or None
+        Mapped, or None
             None where F is above the energy given to begin with, a step would lead uphill, or the
             Hessian is not positive definite.
         """
         for _ in range(MOST_STEPS):
-            value, gradient, hessian = self.expand(at, b, R)
+            value, gradient, hessian = self.expand_frame(at, b, R)
             if not value <= energy + ROUNDING:
                 return None
             energy = value
@@ -137,27 +106,30 @@ class FrameMapping:
             if float(gradient @ step) < DECREMENT:
                 point = self.point(z)
                 end = _data_term(point, b, R)
-                return Descent(z, point.mean - point.s * end.wr, hessian, end.energy, at)
+                x = point.mean - point.s * end.wr
+                energies, yes = np.array([end.energy]), np.array([True])
+                return Mapped(z[None], x[None], hessian[None], energies, yes, at)
             at = self.linearise(z)
         return None
 
-    def energy(self, z: FloatArray, b: FloatArray, R: FloatArray) -> float:
+    def frame_energy(self, z: FloatArray, b: FloatArray, R: FloatArray) -> float:
         """F(z)."""
         return _data_term(self.point(z), b, R).energy
 
-    def expand(
+    def expand_frame(
         self, at: LinearisedView, b: FloatArray, R: FloatArray
     ) -> tuple[float, FloatArray, FloatArray]:
         """F, ∇F (q,) and ∇²F (q, q) of a frame."""
         (z, offsets, squared, k, whitened, _, s), slopes = at
+        kernel = self.view.kernel
         n = len(k)
         H, J = slopes[:, :n], slopes[:, n:]
         value, w, wr = _data_term(at.point, b, R)
         w2r = w * wr
         a = 0.5 * (len(b) / s - float(wr @ wr))
         a_slope = float(w2r @ wr) - 0.5 * len(b) / s**2
-        ek = (self._stacked @ np.concatenate([-2.0 * a * whitened, wr])) * k
-        ek_slopes = ek * (2.0 * self._kernel.relative_slope(squared))
+        ek = (self.view.stacked @ np.concatenate([-2.0 * a * whitened, wr])) * k
+        ek_slopes = ek * (2.0 * kernel.relative_slope(squared))
         gradient = z + offsets @ ek_slopes
 
         weights = np.concatenate([np.full(n, -2.0 * a), w])
@@ -166,24 +138,24 @@ class FrameMapping:
         v = (0.5 * a_slope) * g - J @ w2r
         vg = v[:, None] * g
         hessian = (slopes * weights) @ slopes.T
-        hessian += (offsets * (ek * (4.0 * self._kernel.relative_curvature(squared)))) @ offsets.T
+        hessian += (offsets * (ek * (4.0 * kernel.relative_curvature(squared)))) @ offsets.T
         hessian += vg
         hessian += vg.T
-        hessian += (1.0 + float(ek_slopes.sum())) * self._identity
+        hessian += (1.0 + float(ek_slopes.sum())) * self.view.identity
         return value, gradient, hessian
 
     def linearise(self, z: FloatArray) -> LinearisedView:
         """The view at z with its slopes."""
         at = self.point(z)
-        G = at.offsets * (at.k * (2.0 * self._kernel.relative_slope(at.squared)))
-        return LinearisedView(at, G @ self._stacked)
+        G = at.offsets * (at.k * (2.0 * self.view.kernel.relative_slope(at.squared)))
+        return LinearisedView(at, G @ self.view.stacked)
 
     def point(self, z: FloatArray) -> ViewPoint:
         """The view at z."""
-        kernel, offsets = self._kernel, z[:, None] - self._Z_T
+        kernel, offsets = self.view.kernel, z[:, None] - self.view.Z_T
         squared = np.einsum("qn,qn->n", offsets, offsets)
         k = kernel.value(squared)
-        product = k @ self._stacked
+        product = k @ self.view.stacked
         whitened, mean = product[: len(k)], product[len(k) :]  # Eq. (16)
         s = kernel.noise + max(kernel.variance - float(whitened @ whitened), 0.0)  # Eq. (17)
         return ViewPoint(z, offsets, squared, k, whitened, mean, s)

@@ -10,8 +10,8 @@ It is quadratic in x, whose minimum x* = μ - σ_p² w ∘ (μ - b) with w_d = 1
     F(z) = 1/2 Σ_d w_d (μ_d - b_d)² + d_x/2 log σ_p² + |z|²/2,
 
 a problem in q dimensions. `solve` runs Newton's method with the exact Hessian on many frames at
-once, and `follow` on one after its predecessor (`facert.models.gplvm.frame_mapping`). Writing r = μ
-- b, s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s), a' = ∂a/∂s
+once; for one after its predecessor see `facert.models.gplvm.frame_mapping`. Writing r = μ - b,
+s = σ_p², J = ∂μ/∂z, g = ∂s/∂z = -2 G K⁻¹ k and a = ∂F/∂s = -1/2 Σ w² r² + d_x/(2s), a' = ∂a/∂s
 = Σ w³ r² - d_x/(2s²):
 
     ∇F  = J (w r) + a g + z
@@ -20,32 +20,27 @@ once, and `follow` on one after its predecessor (`facert.models.gplvm.frame_mapp
 where u = J (w² r) and e = α (w r) - 2 a K⁻¹ k, the slope of F in k, collects the curvature of the
 kernel itself, ∇²k_i = 2 k'_i I + 4 k''_i (z - z_i)(z - z_i)ᵀ.
 
-With a torch device the view is there, and thousands of frames go over at once; F with its q
-derivatives comes back, and Newton's steps, in q dimensions, stay here. So do single frames, which
-are soon done.
+The view may be on a torch device: thousands of frames go over at once, F with its q derivatives
+comes back, and Newton's steps, in q dimensions, stay here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
 from facert.models.gp.posterior import PosteriorPoint, Predictor, namespace
-from facert.models.gplvm.frame_mapping import (
-    DECREMENT,
-    ROUNDING,
-    FrameMapping,
-    LinearisedView,
-)
-
-if TYPE_CHECKING:
-    import torch
 
 MAX_ITERATIONS = 200  # in all; most frames need three or four
+# Newton decrement (nats) below which one more step solves a frame, without another Hessian: what
+# that leaves is of the order of its square. The energy is a log-probability.
+DECREMENT = 1e-4
+# Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
+ROUNDING = 1e-7
 SHIFTED_DECREMENT = 1e-9  # a shifted step predicts little, however much is left
 SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
 # Frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles, the device's too.
@@ -98,6 +93,40 @@ class Observation:
         return Observation(self.mean[rows], self.variance[rows])
 
 
+class ViewPoint(NamedTuple):
+    """Mean and variance of the source view at z (q,), whatever is observed.
+
+    Parameters
+    ----------
+    z : array, shape (q,)
+    offsets : array, shape (q, N)
+        z - z_i of every position.
+    squared, k : arrays, shape (N,)
+        |z - z_i|², and the kernel there.
+    whitened : array, shape (N,)
+        T k.
+    mean : array, shape (d_x,)
+        μ.
+    s : float
+        σ_p².
+    """
+
+    z: FloatArray
+    offsets: FloatArray
+    squared: FloatArray
+    k: FloatArray
+    whitened: FloatArray
+    mean: FloatArray
+    s: float
+
+
+class LinearisedView(NamedTuple):
+    """A point with its slopes [H | J], (q, N + d_x): most of the work of a step."""
+
+    point: ViewPoint
+    slopes: FloatArray
+
+
 @dataclass(frozen=True)
 class Mapped:
     """Frames in latent space.
@@ -141,44 +170,33 @@ class SourceMapping:
 
     Parameters
     ----------
-    posterior : Predictor
-        The source view, X given Z.
-    device : torch.device, optional
-        Where batches are computed; by default here.
+    view : Predictor
+        The source view, X given Z, perhaps on a device.
     """
 
-    def __init__(self, posterior: Predictor, device: torch.device | None = None) -> None:
-        self.posterior = posterior
-        self._view = posterior if device is None else posterior.on(device)
+    def __init__(self, view: Predictor) -> None:
+        self.view = view
         # F at every training latent is the search for a start: keep what does not change.
-        at = posterior.predict(posterior.Z)
-        self._train_variance = float(at.variance.mean())
-        self._train_means = np.hstack([0.5 * at.mean**2, -at.mean]).T.copy()
-        self._train_energy = 0.5 * posterior.columns * np.log(at.variance) + 0.5 * np.sum(
-            posterior.Z**2, axis=1
+        at, xp = view.predict(view.Z), namespace(view.Z)
+        self._train_variance = float(at.variance.mean())  # it varies little, and serves all
+        self._train_means = xp.concatenate([0.5 * at.mean**2, -at.mean], axis=1).T
+        self._train_energy: FloatArray = 0.5 * (
+            view.columns * xp.log(at.variance) + (view.Z**2).sum(1)
         )
-        self._means_there, self._energy_there = (
-            self._view.there(array) for array in (self._train_means, self._train_energy)
-        )
-        self._frame = FrameMapping(posterior)
 
     def start(self, observed: Observation) -> FloatArray:
         """The training latent of least energy for each frame, (B, q)."""
-        b, R = self._view.there(observed.mean), self._view.there(observed.variance)
-        energies = self._train_energies(b, R, self._means_there, self._energy_there)
-        return np.asarray(self.posterior.Z[self._view.here(energies.argmin(1))])
+        b, R = self.view.there(observed.mean), self.view.there(observed.variance)
+        return self.view.here(self.view.Z[self._train_energies(b, R).argmin(1)])
 
-    def _train_energies(
-        self, b: FloatArray, R: FloatArray, means: FloatArray, energy: FloatArray
-    ) -> FloatArray:
+    def _train_energies(self, b: FloatArray, R: FloatArray) -> FloatArray:
         """About F at the training latents, (B, N)."""
-        # σ_p² varies little between them: its mean serves all.
         xp = namespace(b)
         w = 1.0 / (self._train_variance + R)
         wb = w * b
         of_frame: FloatArray = 0.5 * xp.einsum("bd,bd->b", wb, b)
-        of_both: FloatArray = xp.concatenate([w, wb], axis=1) @ means
-        return of_both + energy + of_frame[:, None]
+        of_both: FloatArray = xp.concatenate([w, wb], axis=1) @ self._train_means
+        return of_both + self._train_energy + of_frame[:, None]
 
     def energy(self, z: FloatArray, observed: Observation) -> FloatArray:
         """F(z) for B frames, (B,)."""
@@ -199,7 +217,7 @@ class SourceMapping:
         Mapped
             All frames; solved in chunks, so that memory stays bounded.
         """
-        slices = list(chunks_of(len(observed.mean), self._view))
+        slices = list(chunks_of(len(observed.mean), self.view))
         scratch = self._scratch(observed[slices[0]])
         chunks = [
             self._newton(observed[rows], [start[rows] for start in starts], scratch)
@@ -215,50 +233,10 @@ class SourceMapping:
 
     def _scratch(self, observed: Observation) -> FloatArray | None:
         """Memory for the largest product of a chunk; a device has its own."""
-        if self._view.device is not None:
+        if self.view.device is not None:
             return None
-        rows = len(observed.mean) * self.posterior.Z.shape[1]
-        return np.empty((rows, self.posterior.stacked.shape[1]))
-
-    def follow(
-        self,
-        observed: Observation,
-        previous: FloatArray,
-        linearised: LinearisedView | None = None,
-    ) -> Mapped:
-        """Minimise F for one frame, beginning at the predecessor's z or the best training latent.
-
-        Parameters
-        ----------
-        observed : Observation
-            One frame.
-        previous : array, shape (1, q)
-            z of the frame before.
-        linearised : LinearisedView, optional
-            `Mapped.linearised` of that frame, as good as its z and quicker.
-        """
-        frame, b, R = self._frame, observed.mean[0], observed.variance[0]
-        (energies,) = self._train_energies(
-            observed.mean, observed.variance, self._train_means, self._train_energy
-        )
-        least = energies.argmin()
-        at = linearised or frame.linearise(previous[0])
-        found = frame.descend(at, b, R, float(energies[least]))
-        if found is None:
-            nearest = self.posterior.Z[least]
-            if frame.energy(nearest, b, R) < frame.energy(at.point.z, b, R):
-                at = frame.linearise(nearest)
-            found = frame.descend(at, b, R)
-        if found is None:
-            return self.solve(observed, previous)
-        return Mapped(
-            found.z[None],
-            found.x[None],
-            found.hessian[None],
-            np.array([found.energy]),
-            np.array([True]),
-            found.linearised,
-        )
+        rows = len(observed.mean) * self.view.Z.shape[1]
+        return np.empty((rows, self.view.stacked.shape[1]))
 
     def _newton(
         self, observed: Observation, starts: list[FloatArray], scratch: FloatArray | None
@@ -294,7 +272,7 @@ class SourceMapping:
 
     def _look(self, z: FloatArray, observed: Observation) -> tuple[FloatArray, FloatArray]:
         """F and x* at z (B, q)."""
-        view = self._view
+        view = self.view
         z, b, R = (view.there(array) for array in (z, observed.mean, observed.variance))
         at = view.predict(z)
         w, r = 1.0 / (at.variance[:, None] + R), at.mean - b
@@ -313,7 +291,7 @@ class SourceMapping:
         self, z: FloatArray, observed: Observation, scratch: FloatArray | None = None
     ) -> Expansion:
         """F, ∇F and ∇²F at z (B, q), by the formulas at the head of this file."""
-        view = self._view
+        view = self.view
         z, b, R = (view.there(array) for array in (z, observed.mean, observed.variance))
         kernel, d_x, einsum = view.kernel, view.columns, namespace(z).einsum
         at = view.predict(z)

@@ -64,7 +64,7 @@ def spread(first: int, end: int, most: int) -> IntArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class TrainedViews:
     """A trained model, where another one of the same character begins.
 
     Parameters
@@ -81,7 +81,7 @@ class Start:
     target_units: Normalisation
 
     @classmethod
-    def at(cls, source: Predictor, target: Predictor) -> Start:
+    def at(cls, source: Predictor, target: Predictor) -> TrainedViews:
         """At a model of the same units."""
         same = (Normalisation(np.zeros(view.columns), 1.0) for view in (source, target))
         return cls(source, target, *same)

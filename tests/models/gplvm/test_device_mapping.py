@@ -44,7 +44,7 @@ def device(request):
 
 def test_the_objective_and_its_derivatives_are_the_same(source, observed, device):
     z = np.random.default_rng(3).normal(size=(40, 3))
-    plain, there = SourceMapping(source), SourceMapping(source, device)
+    plain, there = SourceMapping(source), SourceMapping(source.on(device))
     here, away = plain._expand(z, observed), there._expand(z, observed)
     for name in ("energy", "gradient", "hessian"):
         ours, theirs = getattr(away, name), getattr(here, name)
@@ -60,7 +60,7 @@ def test_frames_end_at_the_same_optimum_however_they_are_cut(
 ):
     monkeypatch.setattr(source_mapping, "DEVICE_CHUNK", chunk)
     plain = SourceMapping(source).solve(observed)
-    there = SourceMapping(source, device).solve(observed)
+    there = SourceMapping(source.on(device)).solve(observed)
     assert there.converged.all()
     for name in ("z", "x", "energy"):
         ours, theirs = getattr(there, name), getattr(plain, name)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from facert.models.gp.posterior import Posterior
-from facert.models.gplvm.source_mapping import Observation, SourceMapping
+from facert.models.gplvm.frame_mapping import FrameMapping
+from facert.models.gplvm.source_mapping import Observation
 from facert.models.kernels import KERNELS
 
 THETA = {"variance": 1.2, "inverse_width": 0.5, "noise": 0.02}
@@ -16,14 +17,14 @@ def mapping(request):
     rng = np.random.default_rng(0)
     Z = rng.normal(size=(25, LATENT))
     X = np.sin(Z @ rng.normal(size=(LATENT, COLUMNS)))
-    return SourceMapping(Posterior(Z, X, KERNELS[request.param](**THETA)))
+    return FrameMapping(Posterior(Z, X, KERNELS[request.param](**THETA)))
 
 
 def performance(mapping, missing, frames=200):
     """A smooth path through the latent space as the source view shows it, with noise and gaps."""
     rng = np.random.default_rng(1)
     time = np.linspace(0.0, 6.0, frames)[:, None]
-    clean = mapping.posterior.predict(np.sin(time * [1.0, 1.7, 2.3])).mean
+    clean = mapping.view.predict(np.sin(time * [1.0, 1.7, 2.3])).mean
     observed = clean + 0.05 * rng.normal(size=clean.shape)
     observed[rng.random(observed.shape) < missing] = np.nan
     return Observation.of(observed, 0.1)
@@ -36,8 +37,8 @@ def test_energy_gradient_and_hessian_are_those_of_the_batch(mapping, missing):
     batch = mapping._expand(Z, observed)
     for row, z in enumerate(Z):
         of_frame = observed.mean[row], observed.variance[row]
-        energy, gradient, hessian = mapping._frame.expand(mapping._frame.linearise(z), *of_frame)
-        assert energy == mapping._frame.energy(z, *of_frame)
+        energy, gradient, hessian = mapping.expand_frame(mapping.linearise(z), *of_frame)
+        assert energy == mapping.frame_energy(z, *of_frame)
         assert energy == pytest.approx(batch.energy[row], rel=1e-12)
         for ours, theirs in ((gradient, batch.gradient[row]), (hessian, batch.hessian[row])):
             np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-12 * np.abs(theirs).max())
@@ -82,15 +83,14 @@ def test_descent_is_refused_above_the_energy_given_and_on_a_saddle(mapping):
     observed = performance(mapping, 0.0, frames=1)
     b, R = observed.mean[0], observed.variance[0]
     (z,) = mapping.solve(observed).z
-    frame = mapping._frame
-    least = frame.energy(z, b, R)
-    assert frame.descend(frame.linearise(z), b, R, least + 1.0) is not None
-    assert frame.descend(frame.linearise(z), b, R, least - 1.0) is None
+    least = mapping.frame_energy(z, b, R)
+    assert mapping.descend(mapping.linearise(z), b, R, least + 1.0) is not None
+    assert mapping.descend(mapping.linearise(z), b, R, least - 1.0) is None
     starts = np.random.default_rng(4).normal(scale=2.0, size=(200, LATENT))
-    points = [frame.linearise(start) for start in starts]
-    curved = [s for s in points if np.linalg.eigvalsh(frame.expand(s, b, R)[2])[0] < 0]
+    points = [mapping.linearise(start) for start in starts]
+    curved = [s for s in points if np.linalg.eigvalsh(mapping.expand_frame(s, b, R)[2])[0] < 0]
     assert curved
-    assert all(frame.descend(at, b, R) is None for at in curved)
+    assert all(mapping.descend(at, b, R) is None for at in curved)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3])

@@ -21,7 +21,7 @@ def make_mapping(seed=0, latent_dim=2, columns=6, kernel=SquaredExponential):
 def make_frames(mapping, count, missing=0.0, seed=1):
     """Noisy observations near the manifold, with NaN where a dimension was not seen."""
     rng = np.random.default_rng(seed)
-    clean = mapping.posterior.predict(rng.normal(size=(count, mapping.posterior.Z.shape[1]))).mean
+    clean = mapping.view.predict(rng.normal(size=(count, mapping.view.Z.shape[1]))).mean
     frames = clean + SIGMA_C * rng.normal(size=clean.shape)
     frames[rng.random(frames.shape) < missing] = np.nan
     return frames
@@ -34,7 +34,7 @@ def mapping():
 
 def full_objective(mapping, x, z, frame, previous=None):
     """Minus the logarithm of Eq. (12), over x and z, for one frame."""
-    at = mapping.posterior.predict(z[None])
+    at = mapping.view.predict(z[None])
     seen = ~np.isnan(frame)
     value = ((x - frame)[seen] ** 2).sum() / (2 * SIGMA_C**2)
     if previous is not None:
@@ -106,7 +106,7 @@ def test_a_dimension_that_was_not_seen_does_not_enter_the_data_term(mapping):
 def test_what_was_not_seen_comes_back_as_the_models_mean(mapping):
     frames = make_frames(mapping, 8, missing=0.3)
     mapped = mapping.solve(Observation.of(frames, SIGMA_C))
-    mean = mapping.posterior.predict(mapped.z).mean
+    mean = mapping.view.predict(mapped.z).mean
     hidden = np.isnan(frames)
     np.testing.assert_allclose(mapped.x[hidden], mean[hidden], rtol=1e-10)
 
@@ -115,7 +115,7 @@ def test_a_frame_without_any_observation_maps_to_the_most_probable_latent(mappin
     observed = Observation.of(np.full((1, 6), np.nan), SIGMA_C)
     mapped = mapping.solve(observed)
     assert mapped.converged.all()
-    assert (mapped.energy <= mapping.energy(mapping.posterior.Z, _repeat(observed, 18))).all()
+    assert (mapped.energy <= mapping.energy(mapping.view.Z, _repeat(observed, 18))).all()
 
 
 def _repeat(observed, count):

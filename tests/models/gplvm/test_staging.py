@@ -5,7 +5,7 @@ from facert.models.gplvm.fitting import train
 from facert.models.gplvm.initial_latents import align
 from facert.models.gplvm.lle import constraint_matrix, view_rows
 from facert.models.gplvm.module import GaussianView, SharedGPLVM
-from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, Start, spread
+from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, TrainedViews, spread
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
 
@@ -71,7 +71,7 @@ def test_rows_of_the_core_stay_and_the_others_are_placed_where_their_view_explai
 ):
     (X, Y), (core, module) = views, trained
     posteriors = module.posteriors()
-    Z = Start.at(*posteriors).latents(X, Y, LABELLED)
+    Z = TrainedViews.at(*posteriors).latents(X, Y, LABELLED)
     assert Z.shape == (LABELLED + 360, 2)
     np.testing.assert_array_equal(Z[core.rows_x], module.latents(module.source))
     Z_y = np.vstack([Z[:LABELLED], Z[len(X) :]])
