@@ -71,7 +71,7 @@ class PoseRegression:
         distances, products = cdist(inputs, inputs), inputs @ inputs.T
         distance = max(float(distances.mean()), TINY)
         product = max(float(products.diagonal().mean()), TINY)
-        R = (np.exp(-distances / distance) + products / product) / 2.0
+        R = _kernel(distances / distance, products / product)
         weights, errors = _solve(R, rest - mean)
         return cls(centre, scale, inputs, distance, product, mean, weights, errors)
 
@@ -79,13 +79,17 @@ class PoseRegression:
         """The rest, (B, r), of poses with these values of the given controls, (B, k)."""
         inputs = (values - self.centre) / self.scale
         products = inputs @ self.inputs.T / self.product
-        R = (np.exp(-self.distances(values)) + products) / 2.0
-        return np.asarray(self.mean + R @ self.weights)
+        return self.mean + _kernel(self.distances(values), products) @ self.weights
 
     def distances(self, values: FloatArray) -> FloatArray:
         """d/d̄ of values (B, k) from every known pose, (B, n)."""
         inputs = (values - self.centre) / self.scale
         return np.asarray(cdist(inputs, self.inputs) / self.distance)
+
+
+def _kernel(distances: FloatArray, products: FloatArray) -> FloatArray:
+    """R without its noise, from d/d̄ and gᵀg'/s."""
+    return np.asarray(np.exp(-distances) + products) / 2.0
 
 
 def _scale(given: FloatArray) -> FloatArray:
