@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from facert.cli.shared import console
-from facert.cli.shared.interrupt import interruptible
+from facert.cli.shared.files import read_actor
+from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import (
     ACTOR,
     HOST,
@@ -18,13 +18,12 @@ from facert.cli.shared.options import (
     argument,
     option,
 )
-from facert.errors import InputError, reading
+from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.pages.view_data import Performance
-    from facert.render.faces import Face
     from facert.retarget.retargeter import Retargeter
 
 
@@ -65,12 +64,10 @@ def command(
     truth = read_take_file(truth_path, theirs) if truth_path is not None else None
     with reading(path):
         performance = _performance(take, rig, truth, retargeter)
-        actor = actor_of(take, actor_path, shapes)
+        actor = read_actor(take, actor_path, shapes)
     with page_server(path.name, host, port) as server:
         page = ViewPage(server, performance, actor)
-        console.show(f"{address(server)} (Ctrl-C ends it)")
-        with interruptible() as asked:
-            asked.wait()
+        wait_for_end(address(server))
         page.stop()
 
 
@@ -84,21 +81,3 @@ def _performance(
         return retargeted(take, retargeter, rig, truth)
     posed_here = take.labels if len(take.labels) < len(take) else take.labels[:0]
     return Performance(take, posed_here, rig, truth)
-
-
-def actor_of(take: Take, path: Path | None, shapes: str | None) -> Face | None:
-    """The face of an actor whose weights were tracked, if his rig is there.
-
-    Raises
-    ------
-    InputError
-        When the take holds markers, or the rig has a shape for none of the weights.
-    """
-    from facert.io.formats import read_rig_file
-    from facert.render.faces import actor_face
-
-    if path is None:
-        return None
-    if take.source.kind != "weights":
-        raise InputError("--actor", "a take of weights", "markers", "Leave it out.")
-    return actor_face(take, read_rig_file(path, shapes))

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from facert.data.take import Take
+    from facert.render.faces import Face
 
 PICTURES = (".png", ".pdf", ".svg")
 
@@ -58,6 +59,24 @@ def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:
     take = read_source_file(path, target)
     with reading(path):
         return take if no_detect else without_faults(take)
+
+
+def read_actor(take: Take, path: Path | None, shapes: str | None) -> Face | None:
+    """The face of an actor whose weights were tracked, if his rig is there.
+
+    Raises
+    ------
+    InputError
+        When the take holds markers, or the rig has a shape for none of the weights.
+    """
+    from facert.io.formats import read_rig_file
+    from facert.render.faces import actor_face
+
+    if path is None:
+        return None
+    if take.source.kind != "weights":
+        raise InputError("--actor", "a take of weights", "markers", "Leave it out.")
+    return actor_face(take, read_rig_file(path, shapes))
 
 
 def write_beside(

@@ -9,6 +9,8 @@ from threading import Event
 from types import FrameType
 from typing import Any
 
+from facert.cli.shared import console
+
 
 @contextmanager
 def interruptible() -> Iterator[Event]:
@@ -27,3 +29,10 @@ def interruptible() -> Iterator[Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def wait_for_end(page: str) -> None:
+    """Print the address of a page, and serve it until Ctrl-C."""
+    console.show(f"{page} (Ctrl-C ends it)")
+    with interruptible() as asked:
+        asked.wait()

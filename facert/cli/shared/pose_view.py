@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import require_name
-from facert.cli.shared.interrupt import interruptible
+from facert.cli.shared.files import read_actor, require_name
+from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import DEFAULT_MODEL
 from facert.errors import OutputExistsError, reading
 
@@ -40,7 +40,6 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     from facert.pages.server import address, page_server, require_viser
 
     require_viser()
-    from facert.cli.commands.view import actor_of
     from facert.pages.pose_page import PosePage
 
     if files.rig is None:
@@ -48,14 +47,12 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     rig = read_rig_file(files.rig, files.shapes)
     take = None if files.take is None else read_take_file(files.take, files.target)
     session = _session(files, rig, take, overwrite)
-    actor = None if take is None else actor_of(take, files.actor, files.shapes)
+    actor = None if take is None else read_actor(take, files.actor, files.shapes)
     title = files.rig.name if files.take is None else files.take.name
     with page_server(title, host, port) as server:
         with reading(files.rig):
             page = PosePage(server, rig, session, actor)
-        console.show(f"{address(server)} (Ctrl-C ends it)")
-        with interruptible() as asked:
-            asked.wait()
+        wait_for_end(address(server))
         page.stop()
     if session.saved:
         console.show(f"{session.output}: {session.saved} poses saved")
