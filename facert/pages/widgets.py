@@ -188,8 +188,7 @@ class Timeline:
             self._seek(int(event.target.value))
 
     def _toggle(self) -> None:
-        self._playback.playing = not self._playback.playing
-        playing = self._playback.playing
+        playing = self._playback.playing = not self._playback.playing
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = Icon.PLAYER_PAUSE if playing else Icon.PLAYER_PLAY
 
