@@ -12,11 +12,11 @@ README, COMMANDS = ROOT / "README.md", ROOT / "docs" / "commands.md"
 
 
 @pytest.mark.parametrize("page", [README, COMMANDS], ids=lambda page: page.name)
-def test_every_command_is_in_the_table(page, facert):
+def test_every_command_is_listed_in_the_order_of_the_help(page, facert):
     rows = re.findall(r"^\| `facert ([\w-]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
     offered = re.findall(r"^│ ([a-z][\w-]*) ", facert("--help").out, re.MULTILINE)
 
-    assert sorted(rows) == sorted(offered)
+    assert rows == offered
 
 
 def test_it_is_short_enough_to_be_read_to_its_end():
