@@ -214,12 +214,8 @@ def _mean_shape(points: FloatArray) -> FloatArray:
     everywhere = aligned.undo(points[enough])
     lost = np.isnan(everywhere[:, :, 0]).all(axis=0)
     if lost.any():
-        raise InputError(
-            "--stable",
-            "stable markers that are seen together",
-            "some that never are",
-            "Choose others.",
-        )
+        expected, found = "stable markers that are seen together", "some that never are"
+        raise InputError("--stable", expected, found, "Choose others.")
     return np.asarray(np.nanmedian(everywhere, axis=0))
 
 
@@ -264,9 +260,5 @@ def _steady_shape(steady: Source, source: Source, chosen: IntArray) -> FloatArra
 
 def _require_known(known: BoolArray) -> None:
     if not known.any():
-        raise InputError(
-            "--stable",
-            "three stable markers, not on a line, in some frame",
-            "fewer in every frame",
-            "Choose other markers.",
-        )
+        expected = "three stable markers, not on a line, in some frame"
+        raise InputError("--stable", expected, "fewer in every frame", "Choose other markers.")

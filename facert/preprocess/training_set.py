@@ -91,12 +91,8 @@ def _usable_labels(take: Take, usable: BoolArray) -> IntArray:
 def _choose_labels(labels: IntArray, settings: Settings, rng: np.random.Generator) -> IntArray:
     count = len(labels) if settings.labels is None else settings.labels
     if count > len(labels):
-        raise InputError(
-            "labels",
-            f"at most {len(labels)}, the posed frames of the take",
-            f"{count}",
-            "Pose more frames or ask for fewer.",
-        )
+        expected, found = f"at most {len(labels)}, the posed frames of the take", f"{count}"
+        raise InputError("labels", expected, found, "Pose more frames or ask for fewer.")
     if count < MIN_LABELS:
         raise InputError(
             "/target/params" if settings.labels is None else "labels",
