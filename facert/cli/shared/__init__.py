@@ -1,1 +1,5 @@
-"""What commands share: options, batches, the console, progress, pictures."""
+"""What commands share: options and their help, files, several files at once, the console, progress.
+
+`conversion`, `live_status` and `pose_view` are the parts of `convert`, `live` and `pose` that need
+NumPy or rich at import: they are loaded when such a command runs, not for its help.
+"""
