@@ -109,9 +109,9 @@ def _solve(R: FloatArray, Y: FloatArray) -> tuple[FloatArray, FloatArray]:
     precisions = 1.0 / (ridge.values[:, None] + NOISES)  # (n, noises)
     weights, errors = np.zeros_like(Y), np.zeros_like(Y)
     for noise, share in zip(NOISES, _shares(precisions, ridge.projected), strict=True):
-        solved = ridge.weights(noise)
-        weights += share * solved
-        errors += share * leave_one_out_errors(solved, ridge.diagonal(noise))
+        weighted = share * ridge.weights(noise)
+        weights += weighted
+        errors += leave_one_out_errors(weighted, ridge.diagonal(noise))
     return weights, errors
 
 

@@ -139,6 +139,20 @@ def test_the_baselines_are_the_ones_of_scipy():
         np.testing.assert_allclose(propagate(take, name)[:, 3], expected, atol=1e-8)
 
 
+@pytest.mark.parametrize("method", list(METHODS))
+@pytest.mark.parametrize("flat", [False, True])
+def test_rounding_decides_nothing(method, flat):
+    """Whole frames have 21 coordinates and 4 ways to move; flat points move along a line."""
+    take, _ = performance(params=method != "laplacian" and not flat, every=2)
+    source = take.source * [1.0, 0.0, 0.0] if flat else take.source
+    rng = np.random.default_rng(0)
+    once, twice = (
+        propagate(KeyedPerformance(x, take.keys, take.labels), method)
+        for x in (source, source * (1.0 + 1e-15 * rng.normal(size=source.shape)))
+    )
+    np.testing.assert_allclose(twice, once, atol=1e-7)
+
+
 @pytest.mark.parametrize("kernel", ["linear", "thin_plate_spline"])
 @pytest.mark.parametrize("span", [1, 2, 21])
 def test_labels_in_a_line_or_a_plane_determine_a_radial_interpolation(kernel, span):
