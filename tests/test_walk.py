@@ -1,6 +1,6 @@
 """The walk of a take through the package: each room is entered once, from the top down.
 
-``python tests/test_walk.py`` prints it, with the function by which each room is entered.
+``python tests/test_walk.py`` prints it, with the functions by which each room is entered.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ LOOKED_UP = ("facert.methods.registry",)
 # Made when a module is imported or an object is created: nothing is entered by it.
 PASSING = ("<module>", "__init__", "__post_init__")
 
-Steps = list[tuple[str, str]]
-"""The rooms that are entered in turn, with the function by which each is entered."""
+Steps = list[tuple[str, list[str]]]
+"""The rooms that are entered in turn, with the functions by which each is entered."""
 
 
 @cache
@@ -71,9 +71,12 @@ def walk(what: Callable[[], Any]) -> Steps:
 
     def profile(frame: FrameType, event: str, _: Any) -> None:
         if event == "call" and enters(frame):
-            here = str(room(frame))
+            here, module = str(room(frame)), frame.f_globals["__name__"]
             if not steps or steps[-1][0] != here:
-                steps.append((here, f"{frame.f_globals['__name__']}.{frame.f_code.co_qualname}"))
+                steps.append((here, []))
+            name = f"{module.split('.', 2)[2]}.{frame.f_code.co_qualname}"
+            if name not in steps[-1][1]:
+                steps[-1][1].append(name)
 
     threading.setprofile(profile)
     sys.setprofile(profile)
@@ -126,8 +129,8 @@ def test_with_regions_a_performance_goes_through_them(take: Take) -> None:
 
 def show(title: str, what: Callable[[], Any]) -> None:
     print(title)
-    for number, (_, function) in enumerate(walk(what), 1):
-        print(f"{number}. {function}")
+    for number, (name, functions) in enumerate(walk(what), 1):
+        print(f"{number}. {name}: {', '.join(functions)}")
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""From a recording to arrays to learn from: faults, head motion, gaps, noise, the actor at rest."""
+"""From a recording to arrays: faults, head motion, noise, the actor at rest, training data."""

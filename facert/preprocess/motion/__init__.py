@@ -1,1 +1,1 @@
-"""Markers as captures really are: head motion, bad markers, gaps and noise."""
+"""The motion of a source in time, by which noise is removed and gaps are filled."""
