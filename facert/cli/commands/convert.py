@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
-from facert.cli.shared import console
 from facert.cli.shared.batch import carry_out, plan, require_kept
 from facert.cli.shared.options import (
     ENDING,
@@ -20,10 +19,6 @@ from facert.cli.shared.options import (
     option,
 )
 from facert.io.registry import listed
-
-if TYPE_CHECKING:
-    from facert.cli.shared.conversion import Wanted
-    from facert.data.changes import Changes
 
 
 def command(
@@ -79,7 +74,7 @@ def command(
     facert convert retargeted.h5 curves.csv
     facert convert retargeted.h5 face.glb --rig facert-demo/character.h5
     """
-    from facert.cli.shared.conversion import KINDS, Wanted
+    from facert.cli.shared.conversion import KINDS, Wanted, convert_file
     from facert.data.changes import Changes
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
@@ -97,16 +92,5 @@ def command(
         start_timecode=start_timecode,
     )
     wanted = Wanted(kind, target, shapes, in_fps or fps, rig_path)
-    carry_out(
-        todo, partial(_convert, wanted=wanted, changes=changes, overwrite=overwrite), overwrite
-    )
-
-
-def _convert(
-    source: Path, output: Path, *, wanted: Wanted, changes: Changes, overwrite: bool
-) -> None:
-    """One file."""
-    from facert.cli.shared.conversion import convert_file
-
-    content = convert_file(source, output, wanted, changes, overwrite)
-    console.show(f"{output}: {content}")
+    work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
+    carry_out(todo, work, overwrite)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from facert.cli.shared import console
 from facert.cli.shared.files import warn_of_unit
 from facert.data.changes import Changes, converted, in_space
 from facert.data.labelling import weights_as_poses
@@ -36,9 +37,9 @@ class Wanted:
 
 
 def convert_file(
-    source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool = False
-) -> str:
-    """Convert a file; return what was written, in words.
+    source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool
+) -> None:
+    """Convert a file, and print what was written.
 
     Raises
     ------
@@ -47,6 +48,10 @@ def convert_file(
     OutputExistsError
         When `output` exists and `overwrite` is not set.
     """
+    console.show(f"{output}: {_convert(source, output, wanted, changes, overwrite)}")
+
+
+def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool) -> str:
     of_morphs = "morphs" in require_output(output, overwrite, *KINDS).write
     if holds_mesh_sequence(source):
         return _convert_sequence(source, output, changes, overwrite)
