@@ -113,18 +113,18 @@ def training_data(take: Take, settings: Settings) -> TrainingData:
     chosen = choose_training_set(clean, settings)
     poses = np.vstack([chosen.Y_labelled, chosen.Y_unlabelled])
     return TrainingData(
-        prepared,
-        take.source.names,
-        SourceLayout(clean.source.kind, clean.source.names),
-        take.controls,
-        chosen,
-        poses,
-        _step(prepared),
-        _complete_frames(clean.source, chosen),
-        _neutral(clean, chosen, settings),
-        pose_bounds(clean, chosen.Y_labelled, settings.limits),
-        Normalisation.of(poses, "/target/params"),
-        keep(chosen.Y_labelled, clean.animation, settings.seed),
+        prepared=prepared,
+        names=take.source.names,
+        layout=SourceLayout(clean.source.kind, clean.source.names),
+        controls=take.controls,
+        chosen=chosen,
+        poses=poses,
+        step=_step(prepared),
+        complete=_complete_frames(clean.source, chosen),
+        neutral=_neutral(clean, chosen, settings),
+        bounds=pose_bounds(clean, chosen.Y_labelled, settings.limits),
+        target_units=Normalisation.of(poses, "/target/params"),
+        kept=keep(chosen.Y_labelled, clean.animation, settings.seed),
     )
 
 
