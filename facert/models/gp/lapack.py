@@ -47,7 +47,8 @@ def value_and_gradient(
     with np.errstate(over="ignore", invalid="ignore"):
         k = kernel.from_log(log_kernel, noise_floor)
         squared = _squared_distances(Z)
-        K = k.value(squared)
+        K, slope = k.value(squared), k.relative_slope(squared)
+        del squared  # so that its memory serves the factor
         diagonal = np.einsum("nn->n", K)  # a view
         diagonal += k.noise
     L = lower_factor(K)
@@ -62,12 +63,20 @@ def value_and_gradient(
 
     G = dsyrk(-0.5, A_T, beta=0.5 * columns, c=K_inverse, trans=1, lower=1, overwrite_c=1)
     d_noise = math.exp(log_kernel[2]) * float(G.diagonal().sum())
-    W, ones = np.multiply(G, K, out=G), np.ones(n)
-    d_variance = float(dsymv(1.0, W, ones, lower=1).sum())
-    V = np.multiply(W, k.relative_slope(squared), out=W)
-    product = dsymm(4.0, V, np.column_stack([Z, ones]).T, side=1, lower=1).T
+    d_variance, product = _sums(np.multiply(G, K, out=G), slope, Z)
     dZ = product[:, -1:] * Z - product[:, :-1]
     return value, dZ, np.array([d_variance, 0.5 * float(np.vdot(Z, dZ)), d_noise])
+
+
+def _sums(W: FloatArray, slope: FloatArray | float, Z: FloatArray) -> tuple[float, FloatArray]:
+    """Σ W and 4 V [Z, 1], (n, q + 1), where V = W ∘ slope; W is overwritten."""
+    ones = np.ones(len(Z))
+    right = np.column_stack([Z, ones]).T
+    if isinstance(slope, float):  # 4 V 1 gives Σ W as well
+        product = dsymm(4.0 * slope, W, right, side=1, lower=1).T
+        return float(product[:, -1].sum()) / (4.0 * slope), product
+    total = float(dsymv(1.0, W, ones, lower=1).sum())
+    return total, dsymm(4.0, np.multiply(W, slope, out=W), right, side=1, lower=1).T
 
 
 def _squared_distances(Z: FloatArray) -> FloatArray:
