@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 from scipy import sparse
@@ -110,11 +112,16 @@ class SharedGPLVM(nn.Module):
     def _value_and_gradient(self) -> list[Tensor]:
         Z = self.Z.detach()
         dZ = product(self.precision, Z)
-        value, gradient = 0.5 * torch.vdot(Z.view(-1), dZ.view(-1)) + self._prior_constant, [dZ]
+        value, gradient = 0.5 * torch.dot(Z.view(-1), dZ.view(-1)) + self._prior_constant, [dZ]
+        # On the CPU NumPy takes and adds rows in half the time.
+        on_cpu = Z.device.type == "cpu"
+        places: Any = Z.numpy() if on_cpu else Z
+        slopes: Any = dZ.numpy() if on_cpu else dZ
         for view in (self.source, self.target):
-            term, own, *others = view.value_and_gradient(Z[view.rows])
+            rows = view.rows.numpy() if on_cpu else view.rows
+            term, own, *others = view.value_and_gradient(torch.as_tensor(places[rows]))
             value += term
-            dZ.index_add_(0, view.rows, own)
+            slopes[rows] += own.numpy() if on_cpu else own
             gradient += others
         return [value, *gradient]
 
