@@ -34,29 +34,14 @@ class Cell:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a cell.
-
-    Parameters
-    ----------
-    cell : Cell
-    scores : Scores or None
-        None when the method could not run.
-    fit_seconds : float
-        Training, wall-clock.
-    frame_ms : float
-        Mapping, milliseconds a frame, all frames at once.
-    failure : str
-        Why the method could not run; empty when it did.
-    details : str
-        The traceback of an unexpected failure; empty for others.
-    """
+    """What came of a cell."""
 
     cell: Cell
-    scores: Scores | None = None
-    fit_seconds: float = 0.0
-    frame_ms: float = 0.0
-    failure: str = ""
-    details: str = ""
+    scores: Scores | None = None  # None when the method could not run
+    fit_seconds: float = 0.0  # Training, wall-clock
+    frame_ms: float = 0.0  # Mapping, milliseconds a frame, all frames at once
+    failure: str = ""  # Why the method could not run; empty when it did
+    details: str = ""  # The traceback of an unexpected failure; empty for others
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for a file."""

@@ -57,29 +57,18 @@ def compare(truth: Take, result: Take) -> Comparison | None:
 
 @dataclass(frozen=True)
 class Scores:
-    """How far poses are from the true ones, in every measure that methods are compared by.
+    """How far poses are from the true ones, in every measure that methods are compared by."""
 
-    Parameters
-    ----------
-    rms : float
-        Over frames and controls, in the controls' own units: the papers' measure.
-    per_control : tuple of float, length P
-        The same for each control.
-    rms_normalised : float
-        The errors of each control divided by its range first; controls that never move are left
-        out. 1 is as far off as a control can be.
-    jitter : float or None
-        RMS second difference of the error over consecutive frames, in the controls' own units;
-        None when no three frames follow each other.
-    vertex_rms, vertex_p95 : float or None
-        RMS distance over the vertices of a frame: mean and 95th percentile over the frames, in
-        the rig's units; None without a rig.
-    """
-
-    rms: float
-    per_control: tuple[float, ...]
+    rms: float  # Over frames and controls, in the controls' own units: the papers' measure
+    per_control: tuple[float, ...]  # length P: The same for each control
+    # The errors of each control divided by its range first; controls that never move are left out.
+    # 1 is as far off as a control can be.
     rms_normalised: float
+    # RMS second difference of the error over consecutive frames, in the controls' own units; None
+    # when no three frames follow each other
     jitter: float | None = None
+    # RMS distance over the vertices of a frame: mean and 95th percentile over the frames, in the
+    # rig's units; None without a rig
     vertex_rms: float | None = None
     vertex_p95: float | None = None
 

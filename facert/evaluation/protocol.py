@@ -34,27 +34,17 @@ _FRAMES, _ANIMATION, _NOISE, _GAPS, _TEST = range(5)
 
 @dataclass(frozen=True)
 class Protocol:
-    """How the data of a repeat is drawn.
+    """How the data of a repeat is drawn."""
 
-    Parameters
-    ----------
-    split : {"random", "block"}
-        Test frames are any others, or those of other time blocks: the take is cut into ten, every
-        other block is for training, and the two halves change places from repeat to repeat.
-    noise : float
-        Standard deviation of the Gaussian noise on all frames, as a share of the largest standard
-        deviation of a source coordinate.
-    missing : float
-        Share of the (frame, marker) entries that are hidden in test frames, 0 up to below 1.
-    test_frames : int, optional
-        Test on so many frames at most; by default on all the others.
-    seed : int
-    """
-
+    # Test frames are any others, or those of other time blocks: the take is cut into ten, every
+    # other block is for training, and the two halves change places from repeat to repeat
     split: Split = "random"
+    # Standard deviation of the Gaussian noise on all frames, as a share of the largest standard
+    # deviation of a source coordinate
     noise: float = 0.0
+    # Share of the (frame, marker) entries that are hidden in test frames, 0 up to below 1
     missing: float = 0.0
-    test_frames: int | None = None
+    test_frames: int | None = None  # Test on so many frames at most; by default on all the others
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -68,24 +58,15 @@ class Protocol:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A take with known poses, and how methods are tried on it; made by `make_problem`.
+    """A take with known poses, and how methods are tried on it; made by `make_problem`."""
 
-    Parameters
-    ----------
-    take : Take
-        Training data is drawn from it. Where it has an animation, that is the unlabelled target;
-        else poses of its frames may be, see `poses_are_frames`.
-    test : Take
-        Test frames are drawn from it: `take` itself, or another one with the same controls.
-    protocol : Protocol
-    gram : array, shape (P, P), optional
-        The rig's, for errors of vertices.
-    """
-
+    # Training data is drawn from it. Where it has an animation, that is the unlabelled target;
+    # else poses of its frames may be, see `poses_are_frames`.
     take: Take
+    # Test frames are drawn from it: `take` itself, or another one with the same controls
     test: Take
     protocol: Protocol
-    gram: FloatArray | None = None
+    gram: FloatArray | None = None  # (P, P): The rig's, for errors of vertices
 
     @property
     def across(self) -> bool:
@@ -116,22 +97,13 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """Which data one repeat uses; indices rise.
+    """Which data one repeat uses; indices rise."""
 
-    Parameters
-    ----------
-    labelled, unlabelled : arrays of int
-        Frames of the take.
-    poses : array of int
-        Rows of the take's animation where it has one, else frames of the take.
-    test : array of int
-        Frames of the test take.
-    """
-
+    # Frames of the take
     labelled: IntArray
     unlabelled: IntArray
-    poses: IntArray
-    test: IntArray
+    poses: IntArray  # Rows of the take's animation where it has one, else frames of the take
+    test: IntArray  # Frames of the test take
 
 
 def make_problem(

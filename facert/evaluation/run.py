@@ -24,22 +24,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Grid:
-    """The cells of an evaluation: every combination of these.
+    """The cells of an evaluation: every combination of these."""
 
-    Parameters
-    ----------
-    methods : tuple of str
-        Names in the registry.
-    labels, unlabelled : tuple of int
-        How many labelled frames; how many unlabelled frames, and as many poses.
-    repeats : int
-        Draws of each.
-    """
-
-    methods: tuple[str, ...]
+    methods: tuple[str, ...]  # Names in the registry
+    # How many labelled frames; how many unlabelled frames, and as many poses
     labels: tuple[int, ...]
     unlabelled: tuple[int, ...]
-    repeats: int
+    repeats: int  # Draws of each
 
     @property
     def cells(self) -> list[Cell]:

@@ -20,45 +20,30 @@ MEASURES = ("rms_normalised", "jitter", "vertex_rms", "vertex_p95")
 
 @dataclass(frozen=True)
 class EvaluationRow:
-    """A method at one number of labels and of unlabelled data: means over the repeats.
-
-    Parameters
-    ----------
-    method : str
-    labels, unlabelled : int
-    noise, missing : float
-        Of the protocol.
-    repeats : int
-        How many of them the method could run.
-    rms, rms_se : float or None
-        Mean over the repeats and its standard error; None where there is none (no repeat, or one).
-    ratio_to_best : float or None
-        `rms` over the least one of the methods that ran every repeat, on the same draws.
-    rms_normalised, jitter, vertex_rms, vertex_p95, per_control
-        Means of the measures of `facert.evaluation.metrics.Scores`.
-    fit_seconds, frame_ms : float or None
-        Training, and mapping one frame of many.
-    failure : str
-        Why the method could not run some repeat; empty when it ran all.
-    """
+    """A method at one number of labels and of unlabelled data: means over the repeats."""
 
     method: str
     labels: int
     unlabelled: int
+    # Of the protocol
     noise: float
     missing: float
-    repeats: int
+    repeats: int  # How many of them the method could run
+    # Mean over the repeats and its standard error; None where there is none (no repeat, or one)
     rms: float | None
     rms_se: float | None
+    # `rms` over the least one of the methods that ran every repeat, on the same draws
     ratio_to_best: float | None
+    # Means of the measures of `facert.evaluation.metrics.Scores`
     rms_normalised: float | None
     jitter: float | None
     vertex_rms: float | None
     vertex_p95: float | None
     per_control: tuple[float, ...]
+    # Training, and mapping one frame of many
     fit_seconds: float | None
     frame_ms: float | None
-    failure: str = ""
+    failure: str = ""  # Why the method could not run some repeat; empty when it ran all
 
     @property
     def draws(self) -> int | None:

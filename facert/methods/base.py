@@ -52,39 +52,22 @@ def stacked(labelled: Labelled, unlabelled: Unlabelled) -> tuple[FloatArray, Flo
 
 @dataclass(frozen=True)
 class Prediction:
-    """Poses of T frames and what comes with them, in normalised units.
+    """Poses of T frames and what comes with them, in normalised units."""
 
-    Parameters
-    ----------
-    Y : array, shape (T, d_y)
-        Poses.
-    std : array, shape (T, d_y), optional
-        Their predictive standard deviation, where the method has one.
-    X : array, shape (T, d_x)
-        The cleaned source.
-    """
-
-    Y: FloatArray
+    Y: FloatArray  # (T, d_y): Poses
+    # (T, d_y): Their predictive standard deviation, where the method has one
     std: FloatArray | None
-    X: FloatArray
+    X: FloatArray  # (T, d_x): The cleaned source
 
 
 @dataclass(frozen=True)
 class TrainingReport:
-    """The course of a training, for people and for the model file.
+    """The course of a training, for people and for the model file."""
 
-    Parameters
-    ----------
-    result : Result, optional
-        Of the optimiser, where the method descends step by step.
-    figures : mapping of str to float
-        Numbers by their names, e.g. kernel parameters.
-    pose_figures : mapping of str to float
-        Those that have the unit of normalised poses, e.g. errors.
-    """
-
-    result: Result | None = None
+    result: Result | None = None  # Of the optimiser, where the method descends step by step
+    # Numbers by their names, e.g. kernel parameters.
     figures: Mapping[str, float] = field(default_factory=dict)
+    # Those that have the unit of normalised poses, e.g. errors.
     pose_figures: Mapping[str, float] = field(default_factory=dict)
 
 

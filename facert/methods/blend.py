@@ -52,31 +52,18 @@ UNBOUNDED = 1e9  # in normalised units: no limit, in a file of finite numbers
 
 @dataclass(frozen=True, eq=False)
 class BlendMap(Map):
-    """The experts and their weights.
+    """The experts and their weights."""
 
-    Parameters
-    ----------
-    weights : array, shape (4,)
-    range : array, shape (2, d_y)
-        What every expert is clipped to.
-    factor_error : array, shape (d_y,)
-        Cross-validation error of the shrunk factors, root mean square. Their own spread is that of
-        free poses, and does not depend on how well the labels fix them.
-    plain, whitened : FeatureProcess
-    factors : FactorMap
-    residual : FeatureProcess
-        Predicts the factors' error.
-    shrinkage, residual_shrinkage : Shrinkage
-        Of the factors without and with the residual.
-    """
-
-    weights: Annotated[FloatArray, "4"]
-    range: Annotated[FloatArray, "2y"]
+    weights: Annotated[FloatArray, "4"]  # (4,)
+    range: Annotated[FloatArray, "2y"]  # (2, d_y): What every expert is clipped to
+    # (d_y,): Cross-validation error of the shrunk factors, root mean square. Their own spread is
+    # that of free poses, and does not depend on how well the labels fix them.
     factor_error: Annotated[FloatArray, "y", "doubt"]
     plain: FeatureProcess
     whitened: FeatureProcess
     factors: FactorMap
-    residual: FeatureProcess
+    residual: FeatureProcess  # Predicts the factors' error
+    # Of the factors without and with the residual
     shrinkage: Shrinkage
     residual_shrinkage: Shrinkage
 

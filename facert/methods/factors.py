@@ -21,23 +21,14 @@ HUGE = 1e150  # its square is finite
 
 @dataclass(frozen=True, eq=False)
 class FactorMap(Map):
-    """The pose that the factors predict: a linear map, and what limits leave of it.
+    """The pose that the factors predict: a linear map, and what limits leave of it."""
 
-    Parameters
-    ----------
-    centre : array, shape (d_x,)
-        Mean of all frames.
-    weights : array, shape (d_x, d_y)
-    offset, spread : arrays, shape (d_y,)
-        The free pose of the mean frame, and the standard deviation of every free pose.
-    limits, censored : arrays, shape (2, d_y)
-        Lower and upper limits, and 1 where poses pile up there, else 0.
-    """
-
-    centre: Annotated[FloatArray, "x"]
-    weights: Annotated[FloatArray, "xy"]
+    centre: Annotated[FloatArray, "x"]  # (d_x,): Mean of all frames
+    weights: Annotated[FloatArray, "xy"]  # (d_x, d_y)
+    # (d_y,): The free pose of the mean frame, and the standard deviation of every free pose
     offset: Annotated[FloatArray, "y"]
     spread: Annotated[FloatArray, "y"]
+    # (2, d_y): Lower and upper limits, and 1 where poses pile up there, else 0
     limits: Annotated[FloatArray, "2y"]
     censored: Annotated[FloatArray, "2y"]
 

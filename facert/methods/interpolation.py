@@ -19,20 +19,14 @@ SMOOTHING = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class InterpolatingMap(Map):
-    """Radial basis functions |x - x_i| around the posed frames, and a constant.
-
-    Parameters
-    ----------
-    X, Y : arrays, shapes (n, d_x) and (n, d_y)
-        Posed frames.
-    smoothing : array, shape (1,)
-        How far from going through the poses exactly, in normalised units of length.
-    """
+    """Radial basis functions |x - x_i| around the posed frames, and a constant."""
 
     predicts_std: ClassVar[bool] = False
 
+    # (n, d_x) and (n, d_y): Posed frames
     X: Annotated[FloatArray, "nx"]
     Y: Annotated[FloatArray, "ny"]
+    # (1,): How far from going through the poses exactly, in normalised units of length
     smoothing: Annotated[FloatArray, "1"]
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
@@ -61,16 +55,11 @@ class RBF(SupervisedRegression):
 
 @dataclass(frozen=True, eq=False)
 class NearestMap(Map):
-    """The pose of the most similar frame.
-
-    Parameters
-    ----------
-    X, Y : arrays, shapes (n, d_x) and (n, d_y)
-        Posed frames.
-    """
+    """The pose of the most similar frame."""
 
     predicts_std: ClassVar[bool] = False
 
+    # (n, d_x) and (n, d_y): Posed frames
     X: Annotated[FloatArray, "nx"]
     Y: Annotated[FloatArray, "ny"]
 

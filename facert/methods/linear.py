@@ -21,20 +21,12 @@ MAX_COMPONENTS = 20
 
 @dataclass(frozen=True, eq=False)
 class LinearMap(Map):
-    """Y = X W + b.
-
-    Parameters
-    ----------
-    weights : array, shape (d_x, d_y)
-        W.
-    offset : array, shape (d_y,)
-        b.
-    """
+    """Y = X W + b."""
 
     predicts_std: ClassVar[bool] = False
 
-    weights: Annotated[FloatArray, "xy"]
-    offset: Annotated[FloatArray, "y"]
+    weights: Annotated[FloatArray, "xy"]  # (d_x, d_y): W
+    offset: Annotated[FloatArray, "y"]  # (d_y,): b
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""

@@ -27,18 +27,12 @@ MOST_SEARCHED = 200
 
 @dataclass(frozen=True, eq=False)
 class ProcessMap(Map):
-    """A Gaussian process given its training data.
+    """A Gaussian process given its training data."""
 
-    Parameters
-    ----------
-    X, Y : arrays, shapes (n, d_x) and (n, d_y)
-        Training frames and poses, with mean zero.
-    theta : array, shape (4,)
-        θ1, θ2, θ3 and θ4 of `facert.models.gp.hyperparameters`; θ1 or θ4 may be 0.
-    """
-
+    # (n, d_x) and (n, d_y): Training frames and poses, with mean zero
     X: Annotated[FloatArray, "nx"]
     Y: Annotated[FloatArray, "ny"]
+    # (4,): θ1, θ2, θ3 and θ4 of `facert.models.gp.hyperparameters`; θ1 or θ4 may be 0
     theta: Annotated[FloatArray, "4"]
 
     def __post_init__(self) -> None:
@@ -79,24 +73,13 @@ class ProcessMap(Map):
 
 @dataclass(frozen=True, eq=False)
 class FeatureProcess(Map):
-    """A Gaussian process with a linear term, on features of the source.
+    """A Gaussian process with a linear term, on features of the source."""
 
-    Parameters
-    ----------
-    centre : array, shape (d_x,)
-        Mean of all frames.
-    basis : array, shape (d_x, d_x)
-        Of the features, see `facert.models.whitening.whitening`.
-    mean : array, shape (d_y,)
-        The pose expected before any label is seen.
-    process : ProcessMap
-        From features to poses less their mean.
-    """
-
-    centre: Annotated[FloatArray, "x"]
+    centre: Annotated[FloatArray, "x"]  # (d_x,): Mean of all frames
+    # (d_x, d_x): Of the features, see `facert.models.whitening.whitening`
     basis: Annotated[FloatArray, "xx"]
-    mean: Annotated[FloatArray, "y"]
-    process: ProcessMap
+    mean: Annotated[FloatArray, "y"]  # (d_y,): The pose expected before any label is seen
+    process: ProcessMap  # From features to poses less their mean
 
     @classmethod
     def learn(cls, labelled: Labelled, basis: Basis, mean: FloatArray) -> FeatureProcess:

@@ -27,18 +27,10 @@ RIDGE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Shrinkage(ArrayGroup):
-    """The linear map from predicted poses to likely ones.
+    """The linear map from predicted poses to likely ones."""
 
-    Parameters
-    ----------
-    mean : array, shape (d_y,)
-        ȳ.
-    matrix : array, shape (d_y, d_y)
-        (C + R)⁻¹ C, to be applied to rows.
-    """
-
-    mean: Annotated[FloatArray, "y"]
-    matrix: Annotated[FloatArray, "yy"]
+    mean: Annotated[FloatArray, "y"]  # (d_y,): ȳ
+    matrix: Annotated[FloatArray, "yy"]  # (d_y, d_y): (C + R)⁻¹ C, to be applied to rows
 
     @classmethod
     def learn(cls, poses: FloatArray, errors: FloatArray) -> Shrinkage:

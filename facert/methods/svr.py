@@ -25,26 +25,17 @@ TUBES = (0.02, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class PackedMap(Map):
-    """All machines in one matrix: a frame costs one product, whatever the number of controls.
-
-    Parameters
-    ----------
-    X : array, shape (n, d_x)
-        Posed frames.
-    inverse_widths : array, shape (g,)
-        γ of the kernels exp(-γ |x - x'|²) that the machines use.
-    duals : array, shape (g, n, d_y)
-        Weight of each kernel at each posed frame in each control; 0 where it is not used.
-    offset : array, shape (d_y,)
-        Added to the sum.
-    """
+    """All machines in one matrix: a frame costs one product, whatever the number of controls."""
 
     predicts_std: ClassVar[bool] = False
 
-    X: Annotated[FloatArray, "nx"]
+    X: Annotated[FloatArray, "nx"]  # (n, d_x): Posed frames
+    # (g,): γ of the kernels exp(-γ |x - x'|²) that the machines use
     inverse_widths: Annotated[FloatArray, "g"]
+    # (g, n, d_y): Weight of each kernel at each posed frame in each control; 0 where it is not
+    # used
     duals: Annotated[FloatArray, "gny"]
-    offset: Annotated[FloatArray, "y"]
+    offset: Annotated[FloatArray, "y"]  # (d_y,): Added to the sum
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""

@@ -33,18 +33,10 @@ def fill_gaps(X: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Gaussian:
-    """A Gaussian distribution of frames.
+    """A Gaussian distribution of frames."""
 
-    Parameters
-    ----------
-    mean : array, shape (d,)
-        Of each column.
-    covariance : array, shape (d, d)
-        Positive definite.
-    """
-
-    mean: FloatArray
-    covariance: FloatArray
+    mean: FloatArray  # (d,): Of each column
+    covariance: FloatArray  # (d, d): Positive definite
 
     @classmethod
     def of(cls, X: FloatArray) -> Gaussian:

@@ -45,20 +45,11 @@ class Kernel(ABC):
 
     Its functions take squared distances as arrays or tensors of any shape. Rounding may have taken
     those of points that agree below zero.
-
-    Parameters
-    ----------
-    variance : float
-        θ1.
-    inverse_width : float
-        θ2, one over the squared length-scale.
-    noise : float
-        θ3⁻¹, the noise variance.
     """
 
-    variance: float
-    inverse_width: float
-    noise: float
+    variance: float  # θ1
+    inverse_width: float  # θ2, one over the squared length-scale
+    noise: float  # θ3⁻¹, the noise variance
 
     @abstractmethod
     def value(self, squared: Array) -> Array:
@@ -162,15 +153,9 @@ class Matern52(Kernel):
 
 @dataclass(frozen=True)
 class RegressionKernel(SquaredExponential):
-    """The squared exponential with a linear term: k(x, x') = θ1 exp(-θ2/2 |x - x'|²) + θ4 xᵀx'.
+    """The squared exponential with a linear term: k(x, x') = θ1 exp(-θ2/2 |x - x'|²) + θ4 xᵀx'."""
 
-    Parameters
-    ----------
-    linear : float
-        θ4.
-    """
-
-    linear: float = 0.0
+    linear: float = 0.0  # θ4
 
     def cross(self, Z: FloatArray, Z_train: FloatArray) -> FloatArray:
         """The kernel without noise between two sets, (n, q) and (N, q), giving (n, N)."""

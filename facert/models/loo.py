@@ -38,19 +38,12 @@ def leave_one_out_errors(weights: FloatArray, diagonal: FloatArray) -> FloatArra
 
 @dataclass(frozen=True, eq=False)
 class KernelRidge:
-    """Regressions of Y on one kernel with any penalty; leading axes hold several at once.
+    """Regressions of Y on one kernel with any penalty; leading axes hold several at once."""
 
-    Parameters
-    ----------
-    values, vectors : arrays, shapes (..., n) and (..., n, n)
-        v and U.
-    projected : array, shape (..., n, d)
-        Uᵀ Y.
-    """
-
+    # (..., n) and (..., n, n): v and U
     values: FloatArray
     vectors: FloatArray
-    projected: FloatArray
+    projected: FloatArray  # (..., n, d): Uᵀ Y
 
     @classmethod
     def of(cls, K: FloatArray, Y: FloatArray) -> Self:
@@ -82,14 +75,9 @@ class LinearRidge(KernelRidge):
     """Ridge regression of Y on X: the kernel X Xᵀ, decomposed without forming it.
 
     Small penalties would be lost in the rounding of X Xᵀ.
-
-    Parameters
-    ----------
-    pull : array, shape (d_x, r)
-        V diag(S) of X = U diag(S) Vᵀ, r the smaller of n and d_x.
     """
 
-    pull: FloatArray
+    pull: FloatArray  # (d_x, r): V diag(S) of X = U diag(S) Vᵀ, r the smaller of n and d_x
 
     @classmethod
     def of_inputs(cls, X: FloatArray, Y: FloatArray) -> Self:

@@ -37,40 +37,24 @@ STILL = 1e-13  # share of the largest variance: below, known poses do not vary a
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A pose, how certain it is, and samples of other plausible poses.
+    """A pose, how certain it is, and samples of other plausible poses."""
 
-    Parameters
-    ----------
-    pose, std : arrays, shape (P,)
-        The most probable pose, and the standard deviation of each control.
-    samples : array, shape (N, P)
-        Other plausible poses.
-    """
-
+    # (P,): The most probable pose, and the standard deviation of each control
     pose: FloatArray
     std: FloatArray
-    samples: FloatArray
+    samples: FloatArray  # (N, P): Other plausible poses
 
 
 @dataclass(frozen=True, eq=False)
 class Completion:
-    """Completes poses of which the same controls are given; made by `learn`.
+    """Completes poses of which the same controls are given; made by `learn`."""
 
-    Parameters
-    ----------
-    known : KnownPoses
-        n of them.
-    given, rest : arrays of int, shapes (k,) and (r,)
-        The given controls, and the others.
-    regression : PoseRegression
-    errors : array, shape (n, r)
-        Leave-one-out errors of the clipped predictions of the known poses.
-    """
-
-    known: KnownPoses
+    known: KnownPoses  # n of them
+    # (k,) and (r,): The given controls, and the others
     given: IntArray
     rest: IntArray
     regression: PoseRegression
+    # (n, r): Leave-one-out errors of the clipped predictions of the known poses
     errors: FloatArray
 
     @classmethod

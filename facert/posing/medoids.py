@@ -28,20 +28,12 @@ LEAST_GAIN = 1e-6  # an exchange that gains less, relative to the sum, is roundi
 
 @dataclass(frozen=True, eq=False)
 class MedoidProblem:
-    """Points, the candidates to choose medoids from, and which of these may go together.
+    """Points, the candidates to choose medoids from, and which of these may go together."""
 
-    Parameters
-    ----------
-    distances : array, shape (n, m)
-        Of n points to m candidates.
-    covered : array, shape (n,)
-        Distance of each point to what was chosen before; infinite if there is nothing.
-    rivals : array of bool, shape (m, m)
-        Candidates that are not to be chosen together; each is its own rival.
-    """
-
-    distances: FloatArray
+    distances: FloatArray  # (n, m): Of n points to m candidates
+    # (n,): Distance of each point to what was chosen before; infinite if there is nothing
     covered: FloatArray
+    # (m, m): Candidates that are not to be chosen together; each is its own rival
     rivals: BoolArray
 
     def weighted(self, weights: FloatArray) -> MedoidProblem:

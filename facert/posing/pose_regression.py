@@ -36,32 +36,18 @@ TINY = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PoseRegression:
-    """Regression of the other r controls on k given ones, learned from n known poses.
+    """Regression of the other r controls on k given ones, learned from n known poses."""
 
-    Parameters
-    ----------
-    centre, scale : arrays, shape (k,)
-        Mean of each given control, and what its deviations are divided by.
-    inputs : array, shape (n, k)
-        The given controls of the known poses, centred and scaled.
-    distance, product : float
-        d̄ and s.
-    mean : array, shape (r,)
-        Of the rest.
-    weights : array, shape (n, r)
-        R⁻¹ y of each control, averaged over the noises.
-    errors : array, shape (n, r)
-        Leave-one-out errors of the known poses: truth less prediction.
-    """
-
+    # (k,): Mean of each given control, and what its deviations are divided by
     centre: FloatArray
     scale: FloatArray
-    inputs: FloatArray
+    inputs: FloatArray  # (n, k): The given controls of the known poses, centred and scaled
+    # d̄ and s
     distance: float
     product: float
-    mean: FloatArray
-    weights: FloatArray
-    errors: FloatArray
+    mean: FloatArray  # (r,): Of the rest
+    weights: FloatArray  # (n, r): R⁻¹ y of each control, averaged over the noises
+    errors: FloatArray  # (n, r): Leave-one-out errors of the known poses: truth less prediction
 
     @classmethod
     def learn(cls, given: FloatArray, rest: FloatArray) -> PoseRegression:

@@ -54,28 +54,17 @@ class SourceOptions:
 
 @dataclass(frozen=True, eq=False)
 class CleanSource:
-    """A source with the markers or weights of a model, in their order.
+    """A source with the markers or weights of a model, in their order."""
 
-    Parameters
-    ----------
-    source : Source
-        Without bad markers, in the take's units.
-    rest : array, shape of a frame of the take, or None
-        The actor at rest, where frames were named for it.
-    measured, clean : array, shape (T, d_x)
-        Calibrated frames in normalised units, NaN: not observed, and the same without noise and
-        gaps; the measured ones where nothing was smoothed.
-    std : array, shape (T, d_x), or None
-        Standard deviation of the clean frames, in the take's units.
-    input_variance : array, shape (T, d_x), or None
-        Variance of the clean frames where they were not observed, in normalised units; 0 elsewhere.
-    """
-
-    source: Source
+    source: Source  # Without bad markers, in the take's units
+    # Of a frame of the take: the actor at rest, where frames were named for it
     rest: FloatArray | None
+    # (T, d_x): Calibrated frames in normalised units, NaN: not observed, and the same without
+    # noise and gaps; the measured ones where nothing was smoothed
     measured: FloatArray
     clean: FloatArray
-    std: FloatArray | None = None
+    std: FloatArray | None = None  # Standard deviation of the clean frames, in the take's units
+    # Variance of the clean frames where they were not observed, in normalised units; 0 elsewhere
     input_variance: FloatArray | None = None
 
     @property

@@ -36,25 +36,13 @@ PAIRS_AT_ONCE, FEWEST_FRAMES, MOST_FRAMES = 20_000_000, 50, 500
 
 @dataclass(frozen=True, eq=False)
 class Stabilised:
-    """A take without head motion, and what was removed.
-
-    Parameters
-    ----------
-    take : Take
-    head : RigidMotion
-        Takes the stabilised markers to the recorded ones.
-    stable : array of int
-        The markers whose motion was taken for the head's.
-    interpolated : array of bool, shape (T,)
-        Frames that show too few of them.
-    residual : float
-        Root mean square motion that is left to the stable markers, in the take's units.
-    """
+    """A take without head motion, and what was removed."""
 
     take: Take
-    head: RigidMotion
-    stable: IntArray
-    interpolated: BoolArray
+    head: RigidMotion  # Takes the stabilised markers to the recorded ones
+    stable: IntArray  # The markers whose motion was taken for the head's
+    interpolated: BoolArray  # (T,): Frames that show too few of them
+    # Root mean square motion that is left to the stable markers, in the take's units
     residual: float
 
     @property

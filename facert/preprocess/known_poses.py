@@ -16,17 +16,10 @@ MOST = 500
 
 @dataclass(frozen=True, eq=False)
 class KnownPoses:
-    """Poses of a character and what poses are clipped to.
+    """Poses of a character and what poses are clipped to."""
 
-    Parameters
-    ----------
-    poses : array, shape (n, P)
-    bounds : array, shape (P, 2)
-        Infinite where nothing bounds a control.
-    """
-
-    poses: FloatArray
-    bounds: FloatArray
+    poses: FloatArray  # (n, P)
+    bounds: FloatArray  # (P, 2): Infinite where nothing bounds a control
 
     def clip(self, poses: FloatArray) -> FloatArray:
         """Poses (n, P) within the bounds."""
@@ -35,20 +28,11 @@ class KnownPoses:
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Some controls of a pose.
+    """Some controls of a pose."""
 
-    Parameters
-    ----------
-    controls : array of int, shape (k,)
-        Which.
-    values : array, shape (k,)
-    soft : float
-        Standard deviation of the values; at 0 they are met exactly.
-    """
-
-    controls: IntArray
-    values: FloatArray
-    soft: float = 0.0
+    controls: IntArray  # (k,): Which
+    values: FloatArray  # (k,)
+    soft: float = 0.0  # Standard deviation of the values; at 0 they are met exactly
 
 
 def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> FloatArray:

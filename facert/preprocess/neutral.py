@@ -26,21 +26,12 @@ FULL = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A map of frames to what they would have been in the recording that was learned from.
+    """A map of frames to what they would have been in the recording that was learned from."""
 
-    Parameters
-    ----------
-    turn : array, shape (d,)
-        The actor at rest, where a weight's motion begins; infinite where it is only moved.
-    shift : array, shape (d,)
-        How far the rest is moved.
-    stretch : array, shape (d,)
-        By how much what is above `turn` is stretched, less 1.
-    """
-
+    # (d,): The actor at rest, where a weight's motion begins; infinite where it is only moved
     turn: FloatArray
-    shift: FloatArray
-    stretch: FloatArray
+    shift: FloatArray  # (d,): How far the rest is moved
+    stretch: FloatArray  # (d,): By how much what is above `turn` is stretched, less 1
 
     @classmethod
     def of(cls, own: FloatArray, learned: FloatArray, kind: SourceKind) -> Calibration:

@@ -33,69 +33,34 @@ it; with this share, 5 % less and 1 % more."""
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A take to learn from.
+    """A take to learn from."""
 
-    Parameters
-    ----------
-    take : Take
-        Without what no frame shows, bad markers, noise and gaps, as far as the settings ask.
-        Frames that show too little to be learned from are as they were.
-    measured : Source
-        The same with noise and gaps.
-    units : Normalisation
-        Of the measured source.
-    estimate : MotionEstimate or None
-        Of noise and motion; None where frames do not follow each other.
-    """
-
+    # Without what no frame shows, bad markers, noise and gaps, as far as the settings ask. Frames
+    # that show too little to be learned from are as they were.
     take: Take
-    measured: Source
-    units: Normalisation
+    measured: Source  # The same with noise and gaps
+    units: Normalisation  # Of the measured source
+    # Of noise and motion; None where frames do not follow each other
     estimate: MotionEstimate | None
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """All that is learned from a take, in the take's units, and the units to normalise it by.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    names : tuple of str
-        Of the markers or weights that the take was recorded with, seen or not.
-    layout : SourceLayout
-        Of the prepared take.
-    controls : Controls
-    chosen : TrainingSet
-        Frames and poses that a method is given.
-    poses : array, shape (l + n, P)
-        All these poses, those of the labelled frames first.
-    step : float
-        How far frames move on from one to the next, normalised units: σ_t, Eq. (14).
-    complete : array, shape (n, d_x)
-        Frames that show everything, to estimate the noise from.
-    neutral : array, shape (d_x,)
-        The source with the actor at rest; see `Settings.neutral`.
-    bounds : array, shape (P, 2), or None
-        What poses are clipped to.
-    target_units : Normalisation
-        Of the chosen poses.
-    kept : array, shape (k, P)
-        Known poses that a model keeps.
-    """
+    """All that is learned from a take, in the take's units, and the units to normalise it by."""
 
     prepared: Prepared
+    # Of the markers or weights that the take was recorded with, seen or not
     names: tuple[str, ...]
-    layout: SourceLayout
+    layout: SourceLayout  # Of the prepared take
     controls: Controls
-    chosen: TrainingSet
-    poses: FloatArray
-    step: float
-    complete: FloatArray
-    neutral: FloatArray
-    bounds: FloatArray | None
-    target_units: Normalisation
-    kept: FloatArray
+    chosen: TrainingSet  # Frames and poses that a method is given
+    poses: FloatArray  # (l + n, P): All these poses, those of the labelled frames first
+    step: float  # How far frames move on from one to the next, normalised units: σ_t, Eq. (14).
+    complete: FloatArray  # (n, d_x): Frames that show everything, to estimate the noise from
+    neutral: FloatArray  # (d_x,): The source with the actor at rest; see `Settings.neutral`
+    bounds: FloatArray | None  # What poses are clipped to
+    target_units: Normalisation  # Of the chosen poses
+    kept: FloatArray  # (k, P): Known poses that a model keeps
 
 
 def training_data(take: Take, settings: Settings) -> TrainingData:

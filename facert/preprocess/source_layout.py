@@ -18,21 +18,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class SourceColumns:
-    """Indices of a model's columns among the numbers of a source's frames.
+    """Indices of a model's columns among the numbers of a source's frames."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Of the model.
-    index : array of int, shape (d_x,)
-        Of each column among the numbers of a frame; any for those that the source lacks.
-    absent : array of int, shape (a,)
-        The columns that it lacks.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Of the model
+    # (d_x,): Of each column among the numbers of a frame; any for those that the source lacks
     index: IntArray
-    absent: IntArray
+    absent: IntArray  # (a,): The columns that it lacks
 
     def pick(self, X: FloatArray) -> FloatArray:
         """Frames (T, d), or one (d,), in the model's order; NaN in absent columns."""
@@ -49,13 +40,7 @@ class SourceColumns:
 
 @dataclass(frozen=True)
 class SourceLayout:
-    """The markers or weights that a model takes, in its order.
-
-    Parameters
-    ----------
-    kind : {"markers", "weights"}
-    names : tuple of str
-    """
+    """The markers or weights that a model takes, in its order."""
 
     kind: SourceKind
     names: tuple[str, ...]

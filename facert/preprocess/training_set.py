@@ -24,25 +24,14 @@ FILL_FRAMES = 600
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """Complete arrays in the data's own units.
+    """Complete arrays in the data's own units."""
 
-    Parameters
-    ----------
-    X_labelled, Y_labelled : arrays, shapes (l, d_x) and (l, d_y)
-        Frames with their poses.
-    X_unlabelled : array, shape (m, d_x)
-        Frames without a pose.
-    Y_unlabelled : array, shape (n, d_y)
-        Poses without a frame.
-    frames : array of int, shape (l,)
-        The labelled frames' indices in the take.
-    """
-
+    # (l, d_x) and (l, d_y): Frames with their poses
     X_labelled: FloatArray
     Y_labelled: FloatArray
-    X_unlabelled: FloatArray
-    Y_unlabelled: FloatArray
-    frames: IntArray
+    X_unlabelled: FloatArray  # (m, d_x): Frames without a pose
+    Y_unlabelled: FloatArray  # (n, d_y): Poses without a frame
+    frames: IntArray  # (l,): The labelled frames' indices in the take
 
 
 def choose_training_set(take: Take, settings: Settings) -> TrainingSet:

@@ -41,28 +41,15 @@ FREE = 10.0  # variance of the constant, relative to the same
 
 @dataclass(frozen=True, eq=False)
 class TakeSample:
-    """Frames and labels of a take that its regions are found from.
+    """Frames and labels of a take that its regions are found from."""
 
-    Parameters
-    ----------
-    markers, controls : tuple of str, lengths M and P
-        Those markers, or weights, that are seen at all.
-    frames : array, shape (n, M, 3) or (n, M)
-        Complete.
-    labelled : array, shape (l, M, 3) or (l, M)
-        Those with a pose.
-    poses : array, shape (l, P)
-        Their poses.
-    moving : array of bool, shape (P,)
-        Whether any known pose moves a control.
-    """
-
+    # Those markers, or weights, that are seen at all
     markers: tuple[str, ...]
     controls: tuple[str, ...]
-    frames: FloatArray
-    labelled: FloatArray
-    poses: FloatArray
-    moving: BoolArray
+    frames: FloatArray  # (n, M, 3) or (n, M): Complete
+    labelled: FloatArray  # (l, M, 3) or (l, M): Those with a pose
+    poses: FloatArray  # (l, P): Their poses
+    moving: BoolArray  # (P,): Whether any known pose moves a control
 
     @classmethod
     def of(cls, take: Take) -> TakeSample:

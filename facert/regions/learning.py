@@ -35,20 +35,13 @@ MOST_FRAMES = 100
 
 @dataclass(frozen=True)
 class StartingModel:
-    """A trained model for a method to begin at.
-
-    Parameters
-    ----------
-    method : Method
-    source_units, target_units : Normalisation
-        That it was trained in.
-    difference : str or None
-        What of its source and target is not that of the take to train on; it is then not used.
-    """
+    """A trained model for a method to begin at."""
 
     method: Method
+    # That it was trained in
     source_units: Normalisation
     target_units: Normalisation
+    # What of its source and target is not that of the take to train on; it is then not used
     difference: str | None
 
 

@@ -45,23 +45,16 @@ WHOLE = 1e-9  # by which the weights of a control may miss 1
 
 @dataclass(frozen=True, eq=False)
 class RegionLayout(ArrayGroup):
-    """The columns of normalised arrays that each of r regions sees and moves, and its units.
+    """The columns of normalised arrays that each of r regions sees and moves, and its units."""
 
-    Parameters
-    ----------
-    columns : array, shape (r, d_x)
-        1 for what a region sees of the source, else 0.
-    weights : array, shape (r, d_y)
-        Its weight in each control; 0 for those that it does not move. They sum to 1 over regions.
-    units : array, shape (r, 2)
-        Normalised units of the region in those of the face, of source and target.
-    noise : array, shape (r, 2)
-        σ_c and the noise floor of the source, in the region's units.
-    """
-
+    # (r, d_x): 1 for what a region sees of the source, else 0
     columns: Annotated[FloatArray, "rx"]
+    # (r, d_y): Its weight in each control; 0 for those that it does not move. They sum to 1 over
+    # regions.
     weights: Annotated[FloatArray, "ry"]
+    # (r, 2): Normalised units of the region in those of the face, of source and target
     units: Annotated[FloatArray, "r2"]
+    # (r, 2): σ_c and the noise floor of the source, in the region's units
     noise: Annotated[FloatArray, "r2"]
 
     def __post_init__(self) -> None:

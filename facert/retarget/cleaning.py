@@ -22,19 +22,11 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:
-    """A take with a cleaned source.
-
-    Parameters
-    ----------
-    take : Take
-    filled : array of bool, shape (T, M) or (T, D)
-        What had not been observed and is now known.
-    sigma : float or None
-        Standard deviation of the capture noise that was removed, in the take's units.
-    """
+    """A take with a cleaned source."""
 
     take: Take
-    filled: BoolArray
+    filled: BoolArray  # (T, M) or (T, D): What had not been observed and is now known
+    # Standard deviation of the capture noise that was removed, in the take's units
     sigma: float | None = None
 
 

@@ -38,21 +38,12 @@ LooseParts = Literal["refuse", "carry"]
 
 @dataclass(frozen=True)
 class DrivingMethod:
-    """How labels reach the other vertices.
+    """How labels reach the other vertices."""
 
-    Parameters
-    ----------
-    energy : callable, optional
-        From vertices (V, 3) and faces (F, 3) to a quadratic energy (V, V).
-    radial : str
-        The radial basis function, where there is no energy.
-    displacements : bool
-        Whether displacements are interpolated, or positions.
-    """
-
+    # From vertices (V, 3) and faces (F, 3) to a quadratic energy (V, V)
     energy: Energy | None = None
-    radial: RadialFunction = "linear"
-    displacements: bool = True
+    radial: RadialFunction = "linear"  # The radial basis function, where there is no energy
+    displacements: bool = True  # Whether displacements are interpolated, or positions
 
     def interpolant(self, vertices: FloatArray, faces: IntArray, labelled: IntArray) -> Interpolant:
         """The map from the labelled vertices (M,) to all of them."""

@@ -30,18 +30,10 @@ log = logging.getLogger("facert")
 
 @dataclass(frozen=True, eq=False)
 class FeaturePoints:
-    """Points that a face follows.
+    """Points that a face follows."""
 
-    Parameters
-    ----------
-    vertices : array of int, shape (M,)
-        The vertex of each.
-    positions : array, shape (T, M, 3)
-        In the space and units of the mesh, without gaps.
-    """
-
-    vertices: IntArray
-    positions: FloatArray
+    vertices: IntArray  # (M,): The vertex of each
+    positions: FloatArray  # (T, M, 3): In the space and units of the mesh, without gaps
 
 
 def feature_points(

@@ -17,16 +17,6 @@ LEAST = 2
 class KeyedPerformance:
     """Source frames, and the target at some of them.
 
-    Parameters
-    ----------
-    source : array, shape (T, M, D)
-        Feature points of the actor; D = 3 for markers. Weights are one point of D coordinates.
-    keys : array of int, shape (K,)
-        The labelled frames, in any order.
-    labels : array, shape (K, G, C)
-        The target there. Either G = M: each feature point has its own target, of C = 3
-        coordinates; or G = 1: the parameters of a rig, which depend on the whole face.
-
     Raises
     ------
     InputError
@@ -34,8 +24,12 @@ class KeyedPerformance:
         or shapes that do not fit together.
     """
 
+    # (T, M, D): Feature points of the actor; D = 3 for markers. Weights are one point of D
+    # coordinates.
     source: FloatArray
-    keys: IntArray
+    keys: IntArray  # (K,): The labelled frames, in any order
+    # (K, G, C): The target there. Either G = M: each feature point has its own target, of C = 3
+    # coordinates; or G = 1: the parameters of a rig, which depend on the whole face.
     labels: FloatArray
 
     def __post_init__(self) -> None:

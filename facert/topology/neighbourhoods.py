@@ -21,21 +21,11 @@ from facert.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhoods:
-    """The index lists l_i of all neighbourhoods, one after the other.
+    """The index lists l_i of all neighbourhoods, one after the other."""
 
-    Parameters
-    ----------
-    points : int
-        N, how many points they choose from.
-    members : array of int, shape (sum of sizes,)
-        Indices of points.
-    sizes : array of int
-        k_i, how many of the members, all different, belong to each neighbourhood.
-    """
-
-    points: int
-    members: IntArray
-    sizes: IntArray
+    points: int  # N, how many points they choose from
+    members: IntArray  # (sum of sizes,): Indices of points
+    sizes: IntArray  # k_i, how many of the members, all different, belong to each neighbourhood
 
     def by_size(self) -> Iterator[IntArray]:
         """The neighbourhoods of each size k together, (n_k, k)."""

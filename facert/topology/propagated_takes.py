@@ -23,20 +23,13 @@ log = logging.getLogger("facert")
 
 @dataclass(frozen=True)
 class Propagation:
-    """How to propagate; see `facert.topology.propagation.propagate`.
-
-    Parameters
-    ----------
-    method : str
-    width, dim : int, optional
-    limits : {"auto", "declared", "none"}
-        What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
-        range of its key poses and animation.
-    """
+    """How to propagate; see `facert.topology.propagation.propagate`."""
 
     method: str = "residual"
     width: int | None = None
     dim: int | None = None
+    # What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
+    # range of its key poses and animation
     limits: LimitRule = "auto"
 
     def run(self, source: FloatArray, keys: IntArray, labels: FloatArray) -> FloatArray:

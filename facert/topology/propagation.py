@@ -44,18 +44,10 @@ PATH = 0.1  # λ of the path Laplacian
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of time: the frames that are near each frame.
+    """Windows of time: the frames that are near each frame."""
 
-    Parameters
-    ----------
-    width : int
-        k frames, odd.
-    dim : int
-        d, directions of motion within a window.
-    """
-
-    width: int = 15
-    dim: int = 3
+    width: int = 15  # k frames, odd
+    dim: int = 3  # d, directions of motion within a window
 
 
 def propagate(

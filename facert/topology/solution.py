@@ -26,15 +26,9 @@ SINGULAR = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Dense:
-    """A linear map from M labelled points to all N, known by its influence matrix.
+    """A linear map from M labelled points to all N, known by its influence matrix."""
 
-    Parameters
-    ----------
-    influence : array, shape (N, M)
-        A: how much of each label reaches each point; rows add up to 1.
-    """
-
-    influence: FloatArray
+    influence: FloatArray  # (N, M): A: how much of each label reaches each point; rows add up to 1
 
     def __call__(self, labels: FloatArray) -> FloatArray:
         """All points Y = A Ŷ, (N, ...), from labels (M, ...); any number of coordinates."""

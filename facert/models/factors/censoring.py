@@ -30,13 +30,9 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 
 @dataclass(frozen=True, eq=False)
 class CensoringLimits:
-    """How far controls go, infinite where poses do not pile up.
+    """How far controls go, infinite where poses do not pile up."""
 
-    Parameters
-    ----------
-    low, high : arrays, shape (d_y,)
-    """
-
+    # (d_y,)
     low: FloatArray
     high: FloatArray
 
@@ -83,19 +79,11 @@ class ClippedMean:
 
 @dataclass(frozen=True, eq=False)
 class CensoredPoses:
-    """Poses, and which of their entries are at a limit.
+    """Poses, and which of their entries are at a limit."""
 
-    Parameters
-    ----------
-    values : array, shape (n, d_y)
-    sign : array, shape (c,)
-        Of each entry at a limit: 1 at the lower, -1 at the upper one.
-    rows, columns : arrays of int, shape (c,)
-        Where it is.
-    """
-
-    values: FloatArray
-    sign: FloatArray
+    values: FloatArray  # (n, d_y)
+    sign: FloatArray  # (c,): Of each entry at a limit: 1 at the lower, -1 at the upper one
+    # (c,): Where it is
     rows: IntArray
     columns: IntArray
 

@@ -46,47 +46,26 @@ PRIOR_SHARE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class FactorData:
-    """Pairs, frames and poses to learn factors from; both views with mean zero.
+    """Pairs, frames and poses to learn factors from; both views with mean zero."""
 
-    Parameters
-    ----------
-    X, Y : arrays, shapes (l, d_x) and (l, d_y)
-        Frames with their poses.
-    frames : array, shape (m, d_x)
-        Frames without a pose.
-    poses : array, shape (n, d_y)
-        Poses without a frame.
-    limits : CensoringLimits
-        Of the poses.
-    """
-
+    # (l, d_x) and (l, d_y): Frames with their poses
     X: FloatArray
     Y: FloatArray
-    frames: FloatArray
-    poses: FloatArray
-    limits: CensoringLimits
+    frames: FloatArray  # (m, d_x): Frames without a pose
+    poses: FloatArray  # (n, d_y): Poses without a frame
+    limits: CensoringLimits  # Of the poses
 
 
 @dataclass(frozen=True, eq=False)
 class FactorModel:
-    """The weights of both views and their noise.
+    """The weights of both views and their noise."""
 
-    Parameters
-    ----------
-    Wx, Wy : arrays, shapes (d_x, q) and (d_y, q)
-    mean : array, shape (d_y,)
-        μ.
-    noise_x : float
-        σ².
-    noise_y : array, shape (d_y,)
-        The diagonal of Ψ.
-    """
-
+    # (d_x, q) and (d_y, q)
     Wx: FloatArray
     Wy: FloatArray
-    mean: FloatArray
-    noise_x: float
-    noise_y: FloatArray
+    mean: FloatArray  # (d_y,): μ
+    noise_x: float  # σ²
+    noise_y: FloatArray  # (d_y,): The diagonal of Ψ
 
     @property
     def seen_by_frames(self) -> FloatArray:

@@ -46,18 +46,10 @@ STARTS = ((math.log(0.03), math.log(0.3), math.log(3.0)), (math.log(1e-5), math.
 
 @dataclass(frozen=True)
 class MaximumLikelihood:
-    """The best kernel that was found.
+    """The best kernel that was found."""
 
-    Parameters
-    ----------
-    kernel : RegressionKernel
-        In the units of the data.
-    value : float
-        Its log marginal likelihood.
-    """
-
-    kernel: RegressionKernel
-    value: float
+    kernel: RegressionKernel  # In the units of the data
+    value: float  # Its log marginal likelihood
 
 
 def maximise_likelihood(

@@ -28,30 +28,14 @@ def namespace(array: FloatArray) -> Any:
 
 @dataclass(frozen=True)
 class PosteriorPoint:
-    """Mean and variance at B positions, with the terms that their derivatives need.
+    """Mean and variance at B positions, with the terms that their derivatives need."""
 
-    Parameters
-    ----------
-    mean : array, shape (B, D)
-        μ, Eq. (16) or (18).
-    variance : array, shape (B,)
-        σ², Eq. (17), the same for every column of the observations.
-    offsets : array, shape (B, q, N)
-        z - z_i for every position that predictions are made from.
-    squared : array, shape (B, N)
-        |z - z_i|².
-    k : array, shape (B, N)
-        k(z), the kernel against these positions.
-    whitened : array, shape (B, N)
-        T k; for an exact process T = L⁻¹, where L Lᵀ = K.
-    """
-
-    mean: FloatArray
-    variance: FloatArray
-    offsets: FloatArray
-    squared: FloatArray
-    k: FloatArray
-    whitened: FloatArray
+    mean: FloatArray  # (B, D): μ, Eq. (16) or (18).
+    variance: FloatArray  # (B,): σ², Eq. (17), the same for every column of the observations.
+    offsets: FloatArray  # (B, q, N): z - z_i for every position that predictions are made from
+    squared: FloatArray  # (B, N): |z - z_i|²
+    k: FloatArray  # (B, N): k(z), the kernel against these positions
+    whitened: FloatArray  # (B, N): T k; for an exact process T = L⁻¹, where L Lᵀ = K
 
 
 class Predictor:

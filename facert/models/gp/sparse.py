@@ -45,24 +45,12 @@ JITTER = 1e-10
 
 @dataclass(frozen=True)
 class Residual:
-    """The variance that the inducing positions leave of the rows, with their weights.
+    """The variance that the inducing positions leave of the rows, with their weights."""
 
-    Parameters
-    ----------
-    variance : Tensor, shape (n,)
-        The diagonal of K - Q.
-    weights : Tensor, shape (n,)
-        w.
-    noise : float
-        s.
-    columns : int
-        d.
-    """
-
-    variance: Tensor
-    weights: Tensor
-    noise: float
-    columns: int
+    variance: Tensor  # (n,): The diagonal of K - Q
+    weights: Tensor  # (n,): w
+    noise: float  # s
+    columns: int  # d
 
     def repeats(self, variance: Tensor) -> Tensor:
         """The value of w rows that are alike, of such variances (n,), less that of one at 1/w."""
@@ -135,24 +123,14 @@ APPROXIMATIONS: Mapping[ApproximationName, Approximation] = MappingProxyType(
 
 @dataclass(frozen=True)
 class SparseFactors:
-    """L⁻¹, V, A, B and Λ of the head of this file.
+    """L⁻¹, V, A, B and Λ of the head of this file."""
 
-    Parameters
-    ----------
-    L_inverse : Tensor, shape (m, m)
-    V, A : Tensor, shape (m, n)
-    B_cholesky : Tensor, shape (m, m)
-        Lower factor of B.
-    diagonal : Tensor, shape (n,)
-        Λ.
-    residual : Residual
-    """
-
-    L_inverse: Tensor
+    L_inverse: Tensor  # (m, m)
+    # (m, n)
     V: Tensor
     A: Tensor
-    B_cholesky: Tensor
-    diagonal: Tensor
+    B_cholesky: Tensor  # (m, m): Lower factor of B
+    diagonal: Tensor  # (n,): Λ
     residual: Residual
 
 

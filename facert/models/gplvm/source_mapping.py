@@ -55,18 +55,10 @@ def chunks_of(frames: int, view: Predictor) -> Iterator[slice]:
 
 @dataclass(frozen=True)
 class Observation:
-    """The observed source at B frames, in normalised units.
+    """The observed source at B frames, in normalised units."""
 
-    Parameters
-    ----------
-    mean : array, shape (B, d_x)
-        b, finite everywhere.
-    variance : array, shape (B, d_x)
-        R, its variance; infinite where nothing is known.
-    """
-
-    mean: FloatArray
-    variance: FloatArray
+    mean: FloatArray  # (B, d_x): b, finite everywhere
+    variance: FloatArray  # (B, d_x): R, its variance; infinite where nothing is known
 
     @classmethod
     def of(
@@ -94,30 +86,16 @@ class Observation:
 
 
 class ViewPoint(NamedTuple):
-    """Mean and variance of the source view at z (q,), whatever is observed.
+    """Mean and variance of the source view at z (q,), whatever is observed."""
 
-    Parameters
-    ----------
-    z : array, shape (q,)
-    offsets : array, shape (q, N)
-        z - z_i of every position.
-    squared, k : arrays, shape (N,)
-        |z - z_i|², and the kernel there.
-    whitened : array, shape (N,)
-        T k.
-    mean : array, shape (d_x,)
-        μ.
-    s : float
-        σ_p².
-    """
-
-    z: FloatArray
-    offsets: FloatArray
+    z: FloatArray  # (q,)
+    offsets: FloatArray  # (q, N): z - z_i of every position
+    # (N,): |z - z_i|², and the kernel there
     squared: FloatArray
     k: FloatArray
-    whitened: FloatArray
-    mean: FloatArray
-    s: float
+    whitened: FloatArray  # (N,): T k
+    mean: FloatArray  # (d_x,): μ
+    s: float  # σ_p²
 
 
 class LinearisedView(NamedTuple):
@@ -129,30 +107,16 @@ class LinearisedView(NamedTuple):
 
 @dataclass(frozen=True)
 class Mapped:
-    """Frames in latent space.
+    """Frames in latent space."""
 
-    Parameters
-    ----------
-    z : array, shape (B, q)
-        z*, the latent positions.
-    x : array, shape (B, d_x)
-        x*, the most probable source.
-    hessian : array, shape (B, q, q)
-        ∇²F at z*, or a tiny last step before; its inverse is the covariance of z in the Laplace
-        approximation.
-    energy : array, shape (B,)
-        F(z*).
-    converged : array of bool, shape (B,)
-        Whether Newton's method met its tolerance.
-    linearised : LinearisedView, optional
-        Of a single frame that was followed: where its last step was taken from.
-    """
-
-    z: FloatArray
-    x: FloatArray
+    z: FloatArray  # (B, q): z*, the latent positions
+    x: FloatArray  # (B, d_x): x*, the most probable source
+    # (B, q, q): ∇²F at z*, or a tiny last step before; its inverse is the covariance of z in the
+    # Laplace approximation
     hessian: FloatArray
-    energy: FloatArray
-    converged: BoolArray
+    energy: FloatArray  # (B,): F(z*)
+    converged: BoolArray  # (B,): Whether Newton's method met its tolerance
+    # Of a single frame that was followed: where its last step was taken from
     linearised: LinearisedView | None = None
 
 

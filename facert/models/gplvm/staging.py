@@ -29,19 +29,12 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Core:
-    """Rows of both views, labelled ones first.
+    """Rows of both views, labelled ones first."""
 
-    Parameters
-    ----------
-    rows_x, rows_y : arrays of int
-        Rows of X and of Y.
-    labelled : int
-        How many of them, in front of either, are labelled.
-    """
-
+    # Rows of X and of Y
     rows_x: IntArray
     rows_y: IntArray
-    labelled: int
+    labelled: int  # How many of them, in front of either, are labelled
 
     @classmethod
     def of(cls, X: FloatArray, Y: FloatArray, labelled: int) -> Core:
@@ -65,18 +58,12 @@ def spread(first: int, end: int, most: int) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class TrainedViews:
-    """A trained model, where another one of the same character begins.
+    """A trained model, where another one of the same character begins."""
 
-    Parameters
-    ----------
-    source, target : Predictor
-        Its views.
-    source_units, target_units : Normalisation
-        Of the other model, in the units of the views.
-    """
-
+    # Its views
     source: Predictor
     target: Predictor
+    # Of the other model, in the units of the views
     source_units: Normalisation
     target_units: Normalisation
 

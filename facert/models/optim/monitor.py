@@ -12,18 +12,10 @@ WINDOW = 5
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a run, from which a stopped one goes on.
+    """The progress of a run, from which a stopped one goes on."""
 
-    Parameters
-    ----------
-    state : State
-        Of the optimiser.
-    curve : tuple of float
-        The objective after each iteration so far.
-    """
-
-    state: State
-    curve: tuple[float, ...] = field(default=())
+    state: State  # Of the optimiser
+    curve: tuple[float, ...] = field(default=())  # The objective after each iteration so far
 
     def converged(self, tolerance: float) -> bool:
         """Whether the relative decrease an iteration fell below the tolerance."""

@@ -17,30 +17,15 @@ Status = Literal["converged", "iteration limit", "stalled", "interrupted"]
 
 @dataclass(frozen=True)
 class State:
-    """Where a minimisation stands after an iteration.
+    """Where a minimisation stands after an iteration."""
 
-    Parameters
-    ----------
-    x : array, shape (n,)
-        Best vector so far.
-    value : float
-        Objective at x.
-    gradient_norm : float
-        Euclidean norm of the gradient at x.
-    iterations : int
-        Iterations so far.
-    memory : mapping of str to array
-        Whatever else the optimiser goes on from, exactly as if it had not stopped.
-    stalled : bool
-        No further descent is possible from here.
-    """
-
-    x: FloatArray
-    value: float
-    gradient_norm: float
-    iterations: int
+    x: FloatArray  # (n,): Best vector so far
+    value: float  # Objective at x
+    gradient_norm: float  # Euclidean norm of the gradient at x
+    iterations: int  # Iterations so far
+    # Whatever else the optimiser goes on from, exactly as if it had not stopped
     memory: Mapping[str, FloatArray] = field(default_factory=dict)
-    stalled: bool = False
+    stalled: bool = False  # No further descent is possible from here
 
 
 # Called after each iteration that descended; True ends the run.
@@ -61,29 +46,17 @@ class Optimiser(Protocol):
 
 @dataclass(frozen=True)
 class Result:
-    """How a minimisation ended.
+    """How a minimisation ended."""
 
-    Parameters
-    ----------
-    value, gradient_norm : float
-        Objective and norm of its gradient at the end.
-    iterations, evaluations : int
-        How many were made; evaluations count this run only, not those before a resume.
-    seconds : float
-        Wall-clock time of this run.
-    status : {"converged", "iteration limit", "stalled", "interrupted"}
-        Why it ended.
-    message : str
-        The same for people.
-    """
-
+    # Objective and norm of its gradient at the end
     value: float
     gradient_norm: float
+    # How many were made; evaluations count this run only, not those before a resume
     iterations: int
     evaluations: int
-    seconds: float
-    status: Status
-    message: str
+    seconds: float  # Wall-clock time of this run
+    status: Status  # Why it ended
+    message: str  # The same for people
 
 
 def initial_state(objective: Objective, x: FloatArray) -> tuple[State, FloatArray]:

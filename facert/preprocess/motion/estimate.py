@@ -39,34 +39,18 @@ RANGE = (1.0, 10.0)
 
 @dataclass(frozen=True, eq=False)
 class MotionEstimate:
-    """Frames without noise and gaps.
+    """Frames without noise and gaps."""
 
-    Parameters
-    ----------
-    frames, spread : array, shape (T, d)
-        Mean and standard deviation by the model of the motion; NaN in columns that were never
-        observed.
-    hidden : array of bool, shape (T, d)
-        What was not observed.
-    sigma : float
-        Standard deviation of the capture noise.
-    sigma_t : float
-        How far the column that moves most goes from frame to frame, RMS.
-    motion : Motion
-        How the observed columns move, in `units`.
-    units : Normalisation
-        Of the observed columns.
-    given : array, shape (T', d')
-        The observed columns in these units, evenly spaced in time, that the estimate is of.
-    """
-
+    # (T, d): Mean and standard deviation by the model of the motion; NaN in columns that were
+    # never observed
     frames: FloatArray
     spread: FloatArray
-    hidden: BoolArray
-    sigma: float
-    sigma_t: float
-    motion: Motion
-    units: Normalisation
+    hidden: BoolArray  # (T, d): What was not observed
+    sigma: float  # Standard deviation of the capture noise
+    sigma_t: float  # How far the column that moves most goes from frame to frame, RMS
+    motion: Motion  # How the observed columns move, in `units`
+    units: Normalisation  # Of the observed columns
+    # (T', d'): The observed columns in these units, evenly spaced in time, that the estimate is of
     given: FloatArray
 
     def __post_init__(self) -> None:

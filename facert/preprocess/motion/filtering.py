@@ -114,25 +114,13 @@ class MotionFilter:
 
 @dataclass(frozen=True, eq=False)
 class _Gain:
-    """The update of the factors by a frame that shows some columns, whatever its values.
-
-    Parameters
-    ----------
-    seen : array, shape (d,), or None
-    gain : array, shape (2 q, d)
-    P : array, shape (2 q, 2 q)
-        The covariance after the frame.
-    variance : array, shape (d,)
-        Of what the factors then make of each column.
-    settled : bool
-        Whether another such frame will do the same.
-    """
+    """The update of the factors by a frame that shows some columns, whatever its values."""
 
     seen: Seen
-    gain: FloatArray
-    P: FloatArray
-    variance: FloatArray
-    settled: bool
+    gain: FloatArray  # (2 q, d)
+    P: FloatArray  # (2 q, 2 q): The covariance after the frame
+    variance: FloatArray  # (d,): Of what the factors then make of each column
+    settled: bool  # Whether another such frame will do the same
 
     def is_for(self, seen: Seen) -> bool:
         if seen is None or self.seen is None:

@@ -42,25 +42,17 @@ LEAST_VARIANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Motion(ArrayGroup):
-    """The motion of normalised frames, learned from a take.
+    """The motion of normalised frames, learned from a take."""
 
-    Parameters
-    ----------
-    factors : MotionFactors
-        Of unit variance each; their noise is what else is in a column, without capture noise.
-    rates : array, shape (q,)
-        How quickly each factor moves, see `facert.preprocess.motion.smoothing`.
-    rest, rest_rates : array, shape (d,)
-        Variance and rate of what the factors leave over of each column.
-    clock : array, shape (2,)
-        Seconds from frame to frame, which the rates are for, and the standard deviation of the
-        capture noise.
-    """
-
+    # Of unit variance each; their noise is what else is in a column, without capture noise
     factors: MotionFactors
+    # (q,): How quickly each factor moves, see `facert.preprocess.motion.smoothing`
     rates: Annotated[FloatArray, "q"]
+    # (d,): Variance and rate of what the factors leave over of each column
     rest: Annotated[FloatArray, "x"]
     rest_rates: Annotated[FloatArray, "x"]
+    # (2,): Seconds from frame to frame, which the rates are for, and the standard deviation of the
+    # capture noise
     clock: Annotated[FloatArray, "2"]
 
     @property

@@ -26,21 +26,11 @@ ONCE_MORE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class MotionFactors(ArrayGroup):
-    """A few factors that move all columns.
+    """A few factors that move all columns."""
 
-    Parameters
-    ----------
-    mean : array, shape (d,)
-        μ
-    weights : array, shape (d, q)
-        W
-    noise : array, shape (d,)
-        Variance of e.
-    """
-
-    mean: Annotated[FloatArray, "x"]
-    weights: Annotated[FloatArray, "xq"]
-    noise: Annotated[FloatArray, "x"]
+    mean: Annotated[FloatArray, "x"]  # (d,): μ
+    weights: Annotated[FloatArray, "xq"]  # (d, q): W
+    noise: Annotated[FloatArray, "x"]  # (d,): Variance of e
 
     @classmethod
     def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> MotionFactors:

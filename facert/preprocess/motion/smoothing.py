@@ -42,19 +42,11 @@ def transition(a: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Factors given all frames.
+    """Factors given all frames."""
 
-    Parameters
-    ----------
-    mean : array, shape (T, ..., q)
-    covariance : array, shape (T, ..., q, q)
-    following : array, shape (T - 1, ..., q)
-        E[z_t z_{t+1}] of each factor.
-    """
-
-    mean: FloatArray
-    covariance: FloatArray
-    following: FloatArray
+    mean: FloatArray  # (T, ..., q)
+    covariance: FloatArray  # (T, ..., q, q)
+    following: FloatArray  # (T - 1, ..., q): E[z_t z_{t+1}] of each factor
 
 
 class FactorUpdate(NamedTuple):
