@@ -51,7 +51,7 @@ def call_each(
     from joblib import Parallel, delayed
 
     # An interrupted run is meant to cancel what is under way.
-    warnings.filterwarnings("ignore", r"\d+ tasks which were still", UserWarning)
+    warnings.filterwarnings("ignore", r"\d+ tasks (which were|have been)", UserWarning)
     pool = Parallel(
         jobs,
         backend="loky",

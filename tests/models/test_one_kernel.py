@@ -21,7 +21,7 @@ OTHERS = {
     "models/gp/sparse.py": {"log_kernel[2]"},
     # Exponentials of distances that are not squared
     "posing/completion.py": {"-NEAR * distances"},
-    "posing/pose_regression.py": {"-distances / distance", "-self.distances(values)"},
+    "posing/pose_regression.py": {"-distances"},
     "topology/local_ridge.py": {"-distance / REACH"},
 }
 NAMES = {"exp", "exp_", "exp2", "expm1", "erf", "rbf_kernel", "RBF"}
