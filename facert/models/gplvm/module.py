@@ -107,9 +107,10 @@ class SharedGPLVM(nn.Module):
 
     def forward(self) -> Tensor:
         """-log P(X|Z) P(Y|Z) P(Z), the objective of training, Eq. (4)."""
-        return closed_form(lambda *_: self._value_and_gradient(), *self.parameters())
+        return closed_form(lambda *_: self.value_and_gradient(), *self.parameters())
 
-    def _value_and_gradient(self) -> list[Tensor]:
+    def value_and_gradient(self) -> list[Tensor]:
+        """The objective, Eq. (4), and its gradient in each parameter."""
         Z = self.Z.detach()
         dZ = product(self.precision, Z)
         value, gradient = 0.5 * torch.dot(Z.view(-1), dZ.view(-1)) + self._prior_constant, [dZ]

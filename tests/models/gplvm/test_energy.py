@@ -11,6 +11,7 @@ from facert.models.gplvm.lle import constraint_matrix, view_rows
 from facert.models.gplvm.module import GaussianView, SharedGPLVM
 from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
 from facert.models.kernels import KERNELS, SquaredExponential
+from facert.models.optim.flat import FlatObjective
 
 LATENT = 3
 
@@ -67,6 +68,17 @@ def test_value_and_gradient_are_those_of_the_sum(kind):
     summed = with_gradients(module, sum_of_energies(module))
     for ours, theirs in zip(at_once, summed, strict=True):
         torch.testing.assert_close(ours, theirs, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("inducing", [None, 4])
+def test_the_optimisers_are_given_what_torch_is(inducing):
+    module = make_module(inducing=inducing)
+    value, *gradient = with_gradients(module, module())
+    objective = FlatObjective(module)
+    ours = objective(objective.vector)
+    np.testing.assert_allclose(ours[0], value.item(), rtol=1e-12)
+    expected = np.concatenate([part.numpy().ravel() for part in gradient])
+    np.testing.assert_allclose(ours[1], expected, rtol=1e-12)
 
 
 def test_a_sparse_prior_makes_no_difference(monkeypatch):
