@@ -23,7 +23,7 @@ EVERYDAY, SHARED, FINE = "Options", "Shared models", "In a config file alone"
 
 @dataclass(frozen=True)
 class About:
-    """What people are shown of a setting, and the least number that it may be.
+    """Help text and smallest allowed value of a setting.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class About:
 
 @dataclass(frozen=True)
 class Settings:
-    """How to train and how to map.
+    """Settings of training and mapping.
 
     Lengths and noise are in normalised units: the source (and likewise the target) is centred and
     divided by the largest standard deviation of one of its dimensions.
@@ -156,7 +156,7 @@ class Settings:
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """For a file's metadata."""
+        """Convert to plain values for a file's metadata."""
         regions = self.regions.tables if isinstance(self.regions, Regions) else self.regions
         return {**asdict(self), "regions": regions}
 

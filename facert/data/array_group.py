@@ -29,7 +29,7 @@ class ArrayGroup:
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """Every array by its name in files, those of a group as ``group.name``."""
+        """Arrays by their names in files, those of a group as ``group.name``."""
         arrays, groups = self._spelled()
         own = {stored: getattr(self, name) for name, (_, stored) in arrays.items()}
         return own | {

@@ -29,7 +29,7 @@ def set_fields(instance: object, **values: object) -> None:
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
-    """The same array, made read-only."""
+    """Make an array read-only, and return it."""
     array.setflags(write=False)
     return array
 
@@ -108,5 +108,5 @@ def require_plain(text: str, path: str) -> None:
 
 
 def rms(errors: FloatArray) -> float:
-    """Root mean square over everything, the papers' measure."""
+    """Root mean square over all elements, the papers' error measure."""
     return float(np.sqrt(np.mean(np.square(errors))))

@@ -17,7 +17,7 @@ from facert.errors import InputError
 
 @dataclass(frozen=True)
 class Changes:
-    """What to change; None and empty: keep it."""
+    """Requested changes to a take or rig; what is None or empty is kept."""
 
     names: Mapping[str, str] = field(default_factory=dict)
     """From names in the file to new ones, see `renamed`."""
@@ -36,7 +36,7 @@ class Changes:
 
     @property
     def of_frames(self) -> tuple[str, ...]:
-        """The options among them that only a take can follow."""
+        """The requested options that apply to takes only."""
         asked = {
             "--poses": self.poses,
             "--fps": self.fps,
@@ -87,7 +87,7 @@ def _in_time(take: Take, changes: Changes) -> Take:
 
 
 def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
-    """The same take or rig with other names.
+    """A take or rig with its names replaced.
 
     `names` goes from those in the file, in any spelling, to the new ones. Of a take the markers or
     weights and the controls are renamed. What is not in the mapping keeps its name.

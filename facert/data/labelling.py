@@ -159,5 +159,5 @@ def _has_shape(name: str, rig: Rig) -> bool:
 
 
 def predicted_poses(take: Take) -> int:
-    """How many of the posed frames have a standard deviation: a model predicted them."""
+    """Number of posed frames that a model predicted: those with a standard deviation."""
     return 0 if take.std is None else int((take.std[take.labels] > 0).any(axis=1).sum())

@@ -94,7 +94,7 @@ def nearest(name: str, candidates: Sequence[str]) -> str | None:
 
 
 class NameIndex:
-    """Where names, all different, stand in a list, whatever their spelling.
+    """Index of names, all different, in a list, whatever their spelling.
 
     A name is found as it is spelled, or else by the one other spelling of it in the list.
     """
@@ -119,7 +119,7 @@ class NameIndex:
 
 
 def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
-    """Where each wanted name stands among others, in any spelling: indices into `among`, (P,).
+    """Indices into `among` of each wanted name, in any spelling, (P,).
 
     Raises `InputError` naming `field`, what holds `among`: for the first name that is not there,
     with the nearest one that is; for two names that would stand at one place.
@@ -139,7 +139,7 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
 
 
 def fitting(pattern: str, names: Sequence[str]) -> list[int]:
-    """Where the names stand that a name in any spelling, or one with wildcards, means.
+    """Indices of the names that match a name in any spelling, or with wildcards.
 
     >>> fitting("eyeBlink*", ["jawOpen", "eyeBlink_L"]), fitting("JawOpen", ["jawOpen", "jaw*"])
     ([1], [0])

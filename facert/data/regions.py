@@ -79,7 +79,7 @@ class Regions:
         }
 
     def matched(self, markers: Sequence[str], controls: Sequence[str]) -> Regions:
-        """These regions by the markers and controls of a take, which may spell them in another way.
+        """The regions in the spelling of a take's markers and controls.
 
         A marker may be in no region.
 
@@ -111,7 +111,7 @@ class Regions:
         return found
 
     def seen_by(self, markers: Sequence[str]) -> Regions:
-        """These regions with those of their markers alone that are among the given ones.
+        """The regions with only those of their markers that are among the given ones.
 
         Raises `InputError` when a region has none left.
         """

@@ -101,7 +101,7 @@ class MeshSequence:
         return len(self.time)
 
     def batches(self, size: int = 64) -> Iterator[FloatArray]:
-        """All frames in order as vertices (n, V, 3), at most `size` at once."""
+        """Iterate over the frames in order as vertices (n, V, 3), at most `size` at once."""
         for start in range(0, len(self), size):
             yield self.fetch(np.arange(start, min(start + size, len(self))))
 
@@ -145,7 +145,7 @@ class Rig:
 
     @property
     def mesh(self) -> Mesh:
-        """The rest pose alone."""
+        """The mesh in the rest pose."""
         return Mesh(self.neutral, self.faces, self.units, self.colours)
 
     def deform(self, params: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def require_shared(truth: Take, result: Take, fix: str) -> SharedControls:
 
 
 def _pairs(ours: tuple[str, ...], theirs: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Where each shared name stands in both; each finds the other, so that none stands for two."""
+    """Index pairs of the shared names; only mutual matches count, so none is used twice."""
     here, there = NameIndex(ours), NameIndex(theirs)
     found = ((i, there.find(name)) for i, name in enumerate(ours))
     return [(i, j) for i, j in found if j is not None and here.find(theirs[j]) == i]

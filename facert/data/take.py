@@ -30,7 +30,7 @@ SourceKind = Literal["markers", "weights"]
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What was recorded of the actor: markers in space, or tracked weights.
+    """The recorded performance of the actor: markers in space, or tracked weights.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Source:
 
     @property
     def valid(self) -> BoolArray:
-        """What was observed, (T, M) or (T, D)."""
+        """Mask of what was observed, (T, M) or (T, D)."""
         observed = ~np.isnan(self.values)
         return np.asarray(observed.all(axis=2)) if observed.ndim == 3 else observed
 
@@ -89,7 +89,7 @@ class Source:
         return self.values.reshape(len(self.values), -1)
 
     def with_matrix(self, matrix: FloatArray, std: FloatArray | None = None) -> Source:
-        """The same markers or weights with other values, (T, D), and how uncertain these are."""
+        """A source with the same names and new values, (T, D), and their uncertainty."""
         shape = (len(matrix), *self.values.shape[1:])
         spread = None if std is None else std.reshape(shape)
         return Source(matrix.reshape(shape), self.names, spread)

@@ -29,7 +29,7 @@ def _parts(text: str) -> tuple[int, float] | None:
 
 
 def has_thousandths(text: str) -> bool:
-    """Whether a timecode counts 1/60 s, as those with thousandths do."""
+    """Whether a timecode has thousandths, and so counts 1/60 s."""
     return "." in text
 
 

@@ -33,7 +33,7 @@ _FROM_Y = {
 
 
 def with_units(found: Take | Rig, units: str) -> Take | Rig:
-    """The same positions in another unit.
+    """A take or rig with its positions converted to another unit.
 
     Where the file does not state its unit, the numbers are taken to be in `units` already, with a
     line in the log.
@@ -49,7 +49,7 @@ def with_units(found: Take | Rig, units: str) -> Take | Rig:
 
 
 def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
-    """The same positions in a frame whose `up_axis` points up, turned from one with `present`.
+    """A take or rig turned so that `up_axis` points up, from a frame where `present` does.
 
     From z to y, (x, y, z) becomes (x, z, -y). Where `present` is empty, the positions are taken
     to stand so already, with a line in the log.
@@ -67,7 +67,7 @@ def with_up_axis(found: Take | Rig, up_axis: str, present: str) -> Take | Rig:
 
 
 def in_metres(units: str) -> float | None:
-    """How many metres a unit is, in any spelling; None for one that is not known, or none."""
+    """Length in metres of a unit in any spelling; None for an unknown one, or none."""
     short = units.strip().lower()
     return METRES.get(_SPELLINGS.get(short, short))
 

@@ -81,7 +81,7 @@ def pose(parts: Pose, left: float = 1.0, right: float = 1.0) -> FloatArray:
 
 
 def _feelings(seconds: float, rng: np.random.Generator) -> Gestures:
-    """One feeling after the other, in shuffled rounds, a little stronger on one side."""
+    """Gestures of feelings one after the other, in shuffled rounds, stronger on one side."""
     length = 3.2
     count = int(np.ceil(seconds / length))
     rounds = [rng.permutation(list(FEELINGS)) for _ in range(count // len(FEELINGS) + 1)]

@@ -123,7 +123,7 @@ class Muscles:
         return reduce(np.add, parts)
 
     def mirrored(self, shape: FloatArray) -> FloatArray:
-        """The same on the right side."""
+        """A shape (V, 3) of the left side mirrored to the right."""
         return np.asarray(shape[self.head.mirror] * [-1.0, 1.0, 1.0])
 
     def close_lids(self, upper: float, lower: float) -> FloatArray:
@@ -209,7 +209,7 @@ class Muscles:
         return corner + self.mirrored(corner)
 
     def _jaw(self) -> FloatArray:
-        """How far each vertex follows the jaw, (V,)."""
+        """Weight from 0 to 1 by which each vertex follows the jaw, (V,)."""
         z, chin = self.build.hinge[1], self.build.chin[1]
         front = _smoothstep(self.rest[:, 2], z - 0.5, z + 4.0)
         neck = _smoothstep(self.rest[:, 1], chin - 3.2, chin - 0.6)
@@ -234,7 +234,7 @@ class Muscles:
 
     @property
     def _reach(self) -> float:
-        """How wide a muscle acts, with the size of the mouth."""
+        """Factor on the width over which a muscle acts, by the size of the mouth."""
         return self.build.mouth.width / 2.4
 
 

@@ -115,7 +115,7 @@ def _old_animation(seed: int) -> FloatArray:
 
 
 def _unposed(frames: int, posed: int, seed: int) -> IntArray:
-    """All frames but `posed` of them: one at random in each equal part of the take."""
+    """Indices of all frames but the posed ones: one at random in each equal part of the take."""
     rng = np.random.default_rng([seed, 2])
     edges = np.linspace(0, frames, posed + 1).astype(int)
     return np.setdiff1d(np.arange(frames), rng.integers(edges[:-1], edges[1:]))

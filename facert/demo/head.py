@@ -89,7 +89,7 @@ def make_head(build: Build) -> Head:
 
 
 def _join(pieces: list[Patch]) -> tuple[Patch, IntArray]:
-    """One piece out of many, and the tissue of each vertex."""
+    """Join pieces into one, and the tissue of each vertex."""
     starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     joined = Patch(
         np.vstack([piece.vertices for piece in pieces]),

@@ -41,7 +41,7 @@ def field(points: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
 
 
 def cast_from_inside(directions: FloatArray, blobs: Sequence[Blob]) -> FloatArray:
-    """Where rays from the head's inside leave the skin, (n, 3) for unit directions (n, 3)."""
+    """Points where rays from inside the head leave the skin, (n, 3), for directions (n, 3)."""
     return _bisect(np.broadcast_to(ORIGIN, directions.shape), ORIGIN + _FAR * directions, blobs)
 
 
@@ -73,7 +73,7 @@ def _soft_minimum(a: FloatArray, b: FloatArray, blend: float) -> FloatArray:
 
 
 class Tissue(IntEnum):
-    """How a vertex follows the face: skin moves, the rest is on the skull or on the jaw."""
+    """Kind of vertex by how it moves: skin moves, others are fixed to the skull or the jaw."""
 
     SKIN = 0
     SKULL = 1

@@ -40,7 +40,7 @@ def advise(outcomes: Sequence[Outcome]) -> str:
 
 
 def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
-    """What more labels would bring, from the RMS at each number of labels, (labels, repeats)."""
+    """Advice on more labels, from the RMS at each number of labels, (labels, repeats)."""
     means = errors.mean(axis=1)
     seen = f"RMS {means[0]:.3g} with {plural(labels[0], 'label')}"
     if len(labels) == 1:
@@ -54,6 +54,6 @@ def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
 
 
 def _ties(behind: FloatArray) -> bool:
-    """Whether a distance, one number a repeat, is within its standard error."""
+    """Whether the mean of a difference, one number a repeat, is within its standard error."""
     distance = MeanWithError.of(behind)
     return distance.value <= distance.se

@@ -24,7 +24,7 @@ from facert.settings import Settings
 
 @dataclass(frozen=True)
 class Cell:
-    """What is evaluated: a method, the numbers of labels and of unlabelled data, the repeat."""
+    """One evaluated case: a method, the numbers of labels and unlabelled data, the repeat."""
 
     method: str
     labels: int
@@ -34,7 +34,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a cell."""
+    """Result of evaluating one cell."""
 
     cell: Cell
     scores: Scores | None = None  # None when the method could not run
@@ -44,12 +44,12 @@ class Outcome:
     details: str = ""  # The traceback of an unexpected failure; empty for others
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for a file."""
+        """Convert to plain values for a file."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Outcome:
-        """What `as_dict` made.
+        """Rebuild an outcome from what `as_dict` made.
 
         Raises
         ------
@@ -123,7 +123,7 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Nothing in the log: the notes of training would come hundreds of times."""
+    """Silence the log: the notes of training would come hundreds of times."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:

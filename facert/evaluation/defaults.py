@@ -1,4 +1,4 @@
-"""How many labels and how much unlabelled data a take is evaluated with, where it is left open."""
+"""Default numbers of labels and of unlabelled data that a take is evaluated with."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def default_labels(problem: Problem, unlabelled: int) -> tuple[int, ...]:
 
 
 def _frames(problem: Problem) -> tuple[int, int]:
-    """How many posed frames there are to draw from in every repeat, and how many others."""
+    """Numbers of posed frames and of others that every repeat can draw from."""
     parts = [pools(problem, repeat)[0] for repeat in range(2)]  # the halves of a split by blocks
     posed = [int(np.isin(part, problem.take.labels).sum()) for part in parts]
     return min(posed), min(len(part) - count for part, count in zip(parts, posed, strict=True))

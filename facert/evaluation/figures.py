@@ -73,7 +73,7 @@ def plot_errors(rows: Sequence[EvaluationRow], title: str = "") -> Figure:
 
 
 def panels(rows: Sequence[EvaluationRow]) -> list[Panel]:
-    """What there is to draw: one panel for each number that varies, or one for labels."""
+    """Panels to draw: one for each number that varies, or one for labels."""
     rows = [row for row in rows if row.rms is not None]
     labels, unlabelled = {row.labels for row in rows}, {row.unlabelled for row in rows}
     parts = []

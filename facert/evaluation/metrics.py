@@ -1,4 +1,4 @@
-"""How far a result is from the truth."""
+"""Error measures of a result against the truth."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def compare(truth: Take, result: Take) -> Comparison | None:
 
 @dataclass(frozen=True)
 class Scores:
-    """How far poses are from the true ones, in every measure that methods are compared by."""
+    """Errors of poses against the true ones, in every measure that methods are compared by."""
 
     rms: float  # Over frames and controls, in the controls' own units: the papers' measure
     per_control: tuple[float, ...]  # length P: The same for each control
@@ -76,7 +76,7 @@ class Scores:
 def score(
     errors: FloatArray, frames: IntArray, ranges: FloatArray, gram: FloatArray | None = None
 ) -> Scores:
-    """Every measure of the errors of some frames.
+    """Compute every error measure of some frames.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def paired_ratio(errors: FloatArray, others: FloatArray) -> MeanWithError:
 
 
 def errors_by_method(outcomes: Iterable[Outcome]) -> dict[str, FloatArray]:
-    """RMS (labels, repeats) of each method that ran every cell, both rising."""
+    """RMS (labels, repeats) of each method that ran every cell; both axes rise."""
     outcomes = sorted(outcomes, key=lambda o: (o.cell.labels, o.cell.repeat))
     labels = len({outcome.cell.labels for outcome in outcomes})
     repeats = len({outcome.cell.repeat for outcome in outcomes})

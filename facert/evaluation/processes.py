@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """How many this process may use: fewer than there are in a container or on a cluster."""
+    """Number of cores this process may use: not all in a container or on a cluster."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -75,7 +75,7 @@ def _begin_process(begin: Callable[[], object] | None) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent was killed, which could not end it."""
+    """End this process once its parent is gone: a killed parent cannot end it."""
     parent = os.getppid()
     while os.getppid() == parent:
         time.sleep(1.0)

@@ -34,7 +34,7 @@ _FRAMES, _ANIMATION, _NOISE, _GAPS, _TEST = range(5)
 
 @dataclass(frozen=True)
 class Protocol:
-    """How the data of a repeat is drawn."""
+    """Rules by which the data of a repeat is drawn."""
 
     # Test frames are any others, or those of other time blocks: the take is cut into ten, every
     # other block is for training, and the two halves change places from repeat to repeat
@@ -70,18 +70,18 @@ class Problem:
 
     @property
     def across(self) -> bool:
-        """Whether the test is on another take."""
+        """Whether the test frames are from another take."""
         return self.test is not self.take
 
     @property
     def controls(self) -> Controls:
-        """The character's."""
+        """The character's controls."""
         assert self.take.controls is not None  # make_problem
         return self.take.controls
 
     @property
     def poses_are_frames(self) -> bool:
-        """Whether unlabelled poses are poses of its frames.
+        """Whether the unlabelled poses are poses of the take's frames.
 
         They are where there is no animation and at least half of the frames are posed; in a take
         with fewer each pose is worth more as a label, and there are no unlabelled poses.
@@ -171,7 +171,7 @@ def draw(problem: Problem, labels: int, unlabelled: int, repeat: int) -> Draw:
 
 
 def training_take(problem: Problem, chosen: Draw, repeat: int) -> Take:
-    """What a method may see: the labelled and the unlabelled frames, with noise, and the poses."""
+    """The data that a method may see: labelled and unlabelled frames, with noise, and poses."""
     take, rows = problem.take, np.union1d(chosen.labelled, chosen.unlabelled)
     params = np.where(np.isin(rows, chosen.labelled)[:, None], _poses(take)[rows], np.nan)
     pool = _poses(take) if take.animation is None else take.animation
@@ -221,7 +221,7 @@ def _observed(take: Take) -> BoolArray:
 
 
 def _capped(problem: Problem, candidates: IntArray, repeat: int) -> IntArray:
-    """All the candidates, or as many as the protocol allows, in stretches."""
+    """Test frames out of the candidates, as many as the protocol allows, in stretches."""
     most = problem.protocol.test_frames
     if most is None or most >= len(candidates):
         return candidates

@@ -34,7 +34,7 @@ class Grid:
 
     @property
     def cells(self) -> list[Cell]:
-        """All of them, repeat by repeat, so that a part is a fair picture of the whole."""
+        """All cells in order of repeats, so that a part is a fair picture of the whole."""
         return [
             Cell(method, labels, unlabelled, repeat)
             for repeat, labels, unlabelled, method in product(
@@ -94,7 +94,7 @@ def journal_beside(path: Path, problem: Problem, settings: Settings) -> Journal:
 
 
 def fingerprint(problem: Problem, settings: Settings | None = None) -> str:
-    """What outcomes of cells depend on, apart from the cell: data, protocol, settings, version."""
+    """Digest of all that outcomes depend on but the cell: data, protocol, settings, version."""
     given = replace(settings or Settings(), method="", labels=None, unlabelled=0, seed=0)
     digest = hashlib.sha256(repr((VERSION, problem.protocol, problem.across, given)).encode())
     for take in (problem.take, problem.test):

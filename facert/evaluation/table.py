@@ -47,7 +47,7 @@ class EvaluationRow:
 
     @property
     def draws(self) -> int | None:
-        """How many repeats there were, where some but not all could be run."""
+        """Number of repeats that ran, if some failed; None if all did or none ran."""
         return self.repeats if self.failure and self.repeats else None
 
 

@@ -79,7 +79,7 @@ def _read(file: BinaryIO) -> Take:
 
 
 def _points(reader: Reader) -> FloatArray:
-    """All points as the package gives them, (T, points, 5): position, residual, cameras."""
+    """Read all points of the file, (T, points, 5): position, residual, cameras."""
     declared = reader.last_frame - reader.first_frame + 1
     if reader.point_used < 1:  # frames without a point have no bytes: any number may be declared
         raise InputError("POINT:USED", "points", "none", "Export the markers as well.")

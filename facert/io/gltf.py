@@ -152,7 +152,7 @@ def _buffer(uri: Any, folder: Path, own: bytes | None, number: int) -> bytes:
 
 
 def _index(value: Any) -> int:
-    """A number that counts or points: a whole one, not below 0."""
+    """Check that a number is a count or an index: an integer, not below 0."""
     if type(value) is not int or value < 0:
         raise ValueError(f"{value!r} where a whole number from 0 on is due")
     return value

@@ -81,7 +81,7 @@ def read_gltf_mesh(path: Path) -> Mesh:
 
 
 def _primitives(document: Document) -> Iterator[_Primitive]:
-    """Every primitive of triangles in the scene."""
+    """Iterate over the triangle primitives of the scene."""
     for node, world in _placed_nodes(document.root):
         if "mesh" not in node:
             continue
@@ -116,7 +116,7 @@ def _part(document: Document, one: _Primitive) -> _PlacedMesh:
 
 
 def _united(parts: Sequence[_PlacedMesh]) -> _PlacedMesh:
-    """All parts as one; a target that a part does not have leaves it at rest."""
+    """Join parts into one mesh; a target that a part does not have leaves it at rest."""
     names = tuple(dict.fromkeys(name for part in parts for name in part.names))
     sizes = [len(part.vertices) for part in parts]
     _require_moderate(len(names), sum(sizes))

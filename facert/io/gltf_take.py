@@ -56,7 +56,7 @@ def read_gltf_take(path: Path, target: str | None = None) -> Take:
 
 
 def kind_of(path: Path, asked: Kind | None = None) -> Kind:
-    """What was asked for, else the rig: the animation of morph targets is a take beside it."""
+    """Kind to read: the one asked for, else the rig, with a line in the log on its animation."""
     if asked is None:
         with open_gltf(path) as document:
             animated = any(_channels(one) for one in document.root.get("animations", []))

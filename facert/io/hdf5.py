@@ -193,7 +193,7 @@ class StoredRows:
         self.shape: tuple[int, ...] = dataset.shape
 
     def read(self, rows: IntArray) -> FloatArray:
-        """Some rows, (n, ...), as float64.
+        """Read some rows, (n, ...), as float64.
 
         Raises `InputError` when the data are damaged.
         """
@@ -306,7 +306,7 @@ def create(path: Path, format_name: str, version: int, overwrite: bool) -> Itera
 
 
 def _check_storage(dataset: h5py.Dataset, path: str) -> None:
-    """Refuse what is to be read at once and is not plain data, or is declared too large."""
+    """Refuse a dataset that is not plain data, or is too large to read at once."""
     _check_layout(dataset, path)
     _check_size(dataset, path, dataset.shape)
 

@@ -40,7 +40,7 @@ class Journal:
         return entries
 
     def add(self, entry: Mapping[str, Any]) -> None:
-        """Write one more entry."""
+        """Append one entry to the file."""
         with self.path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry, allow_nan=False) + "\n")
 

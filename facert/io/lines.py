@@ -35,7 +35,7 @@ class Line:
 
 
 def read_lines(path: Path, separator: str) -> list[Line]:
-    """All lines of a text file, their cells stripped of blanks.
+    """Read the lines of a text file, their cells stripped of blanks.
 
     Raises `InputError` when the file cannot be read.
     """

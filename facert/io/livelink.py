@@ -152,7 +152,7 @@ def _clock(rows: Sequence[Line]) -> tuple[IntArray, int]:
 
 
 def _counted(ticks: Sequence[int]) -> int:
-    """How many FF make a second, as the ticks of the rows (T,) show; else 60 as the app has it.
+    """Ticks FF a second, counted from those of the rows (T,); else 60 as in the app.
 
     Where FF wraps from one second to the next, its usual step goes on only with the right count.
     """

@@ -68,7 +68,7 @@ def read_ply(path: Path) -> Mesh:
 
 
 def _end_of_header(content: bytes) -> int:
-    """Where the data begin: after the line ``end_header``."""
+    """Offset at which the data begin: after the line ``end_header``."""
     start = content.find(b"\nend_header", 0, MAX_HEADER)
     end = content.find(b"\n", start + 1)
     if not content.startswith(b"ply") or start < 0 or end < 0:
@@ -120,7 +120,7 @@ def _read_elements(elements: list[_Element], body: bytes, text: bool) -> dict[st
 
 
 def _read_element(element: _Element, body: bytes, offset: int, text: bool) -> tuple[Columns, int]:
-    """All rows at once if their lists are as long as the first row's, else one by one."""
+    """Read an element: all rows at once if their lists are equally long, else one by one."""
     names = [one.name for one in element.properties]
     if not element.count or not names:
         return {}, offset

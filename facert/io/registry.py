@@ -43,7 +43,7 @@ class Format:
     """The cells of the table in the docs."""
 
     def functions(self, use: Use) -> Mapping[Kind, str]:
-        """The names of its readers, or of its writers."""
+        """Names of the format's readers or writers, by kind."""
         return self.read if use == "read" else self.write
 
 

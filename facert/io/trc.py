@@ -113,6 +113,6 @@ def _rate(facts: dict[str, str], time: FloatArray) -> float:
 
 
 def _agrees(stated: float, shown: float, time: FloatArray) -> bool:
-    """Whether frames are so far apart usually, or on average where times are rounded."""
+    """Whether frames have this spacing usually, or on average where times are rounded."""
     frames = stated * (time[-1] - time[0])
     return abs(stated - shown) <= SLACK * shown or abs(frames - len(time) + 1) <= SLACK * frames

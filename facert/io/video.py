@@ -50,7 +50,7 @@ def write_clip(pictures: Pictures, path: Path, fps: float, overwrite: bool = Fal
 
 
 def _write_gif(pictures: Pictures, path: Path, fps: float) -> None:
-    """All pictures with the colours of the first, so that nothing flickers."""
+    """Write a GIF with the colours of the first picture in all, so that nothing flickers."""
     from PIL import Image
 
     images = (Image.fromarray(picture) for picture in pictures)

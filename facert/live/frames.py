@@ -51,7 +51,7 @@ def frame_pattern(names: Sequence[str], kind: SourceKind = "weights", units: str
 
 @dataclass
 class Counters:
-    """How many frames and packets there were, by what became of them."""
+    """Counts of frames and packets by what became of them."""
 
     received: int = 0
     """Frames with a face, in order: each is mapped, dropped, or failed."""

@@ -69,7 +69,7 @@ class ModelFile:
         self._seen: Signature | None = None
 
     def changed(self) -> bool:
-        """Whether the file is another than the one that was loaded last, or tried."""
+        """Whether the file differs from the one that was last loaded, or tried."""
         found = self._signature()
         return found is not None and found != self._seen
 
@@ -79,7 +79,7 @@ class ModelFile:
         return facert.load(self.path)
 
     def _signature(self) -> Signature | None:
-        """Time, size and number of the file; None while there is none."""
+        """Modification time, size and inode of the file; None while there is none."""
         try:
             found = self.path.stat()
         except OSError:
@@ -154,7 +154,7 @@ class LiveModel:
 
     @property
     def is_uncalibrated(self) -> bool:
-        """Whether the actor at rest is wanted and not known yet."""
+        """Whether the actor's neutral face is to be measured and is not known yet."""
         return self._rest_watch is not None
 
     def step(self, frame: Frame) -> Streamed:
@@ -271,7 +271,7 @@ def _finite(stream: RetargetStream, frame: Frame) -> Streamed:
 
 
 def _is_near(fps: float, retargeter: Retargeter) -> bool:
-    """Whether frames come about as often as in training: then the stream goes on."""
+    """Whether the frame rate is close to that of training: then the stream continues."""
     motion = retargeter.motion
     return motion is None or abs(fps * motion.clock[0] - 1.0) < NEAR
 

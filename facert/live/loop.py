@@ -28,7 +28,7 @@ CATCH_UP = 0.03
 
 @dataclass(frozen=True)
 class Limits:
-    """When a session ends by itself: after so many mapped frames, after so many seconds."""
+    """Numbers of mapped frames and of seconds after which a session ends by itself."""
 
     frames: float = math.inf
     seconds: float = math.inf

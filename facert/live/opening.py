@@ -73,7 +73,7 @@ class RestWatch:
 
 
 class Displacement(NamedTuple):
-    """How far the rigid motion of a face takes it."""
+    """Distances and angle by which a rigid motion moves a face."""
 
     spread: float
     """Root mean square distance over the markers, in their units."""

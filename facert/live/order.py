@@ -56,7 +56,7 @@ class Order:
         return arrived - self._arrived < SILENCE
 
     def _resumes(self, stamp: float | None, arrived: float) -> bool:
-        """Whether the sender's clock went on in a silence: a pause of the network, or our own."""
+        """Whether the sender's clock ran on during a silence: the network or facert paused."""
         if stamp is None or self._stamp is None:
             return False
         return self._stamp < stamp and self._goes_on(stamp, arrived - self._arrived)
@@ -70,7 +70,7 @@ class Order:
         return identity is not None and hash(identity) in self._known
 
     def _is_late(self, stamp: float | None) -> bool:
-        """Whether a newer frame was here before, by the sender's clock."""
+        """Whether a newer frame, by the sender's clock, arrived before."""
         if stamp is None or self._stamp is None or self._disorder >= _DISTRUST:
             return False
         step = stamp - self._stamp
@@ -95,7 +95,7 @@ class Order:
         return max(stamp - self._ahead, self._time + _LEAST_STEP)
 
     def _goes_on(self, stamp: float, elapsed: float) -> bool:
-        """Whether the sender's clock runs as time does: it is reliable, and was not set."""
+        """Whether the sender's clock keeps pace with real time: reliable, and not reset."""
         if self._stamp is None or self._disorder >= _DISTRUST:
             return False
         return stamp - self._stamp < elapsed + SILENCE

@@ -49,7 +49,7 @@ class Message:
 
 
 def parse(packet: bytes) -> list[Message]:
-    """All messages of a datagram in order, those of bundles too.
+    """Parse the messages of a datagram in order, those of bundles too.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def _message(packet: bytes, place: int) -> Message:
 
 
 def _after(packet: bytes, tag: str, position: int) -> int:
-    """The end of an argument that is passed over."""
+    """Offset after an argument that is skipped."""
     if tag == "b":
         (size,) = _INT.unpack_from(packet, position)
         length = _INT.size + size + -size % 4 if size >= 0 else len(packet)

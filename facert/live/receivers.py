@@ -89,7 +89,7 @@ class UdpReceiver:
         return frames
 
     def rehearse(self) -> None:
-        """Decode the last packet once more, without consequence."""
+        """Decode the last packet again to warm up, without effect on the session."""
         if self._latest:
             self._decoder.rehearse(self._latest)
 
@@ -167,7 +167,7 @@ class TakeReceiver:
 
     @property
     def finished(self) -> bool:
-        """Whether the last frame was played."""
+        """Whether playback reached the last frame."""
         return self._next == len(self._time)
 
     def wait(self, seconds: float) -> list[Frame]:

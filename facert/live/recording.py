@@ -50,7 +50,7 @@ class SpooledRows:
         self._file.close()
 
     def read(self) -> FloatArray:
-        """All rows, (count, width)."""
+        """Read all rows, (count, width)."""
         self._file.seek(0)
         whole = np.frombuffer(self._file.read(8 * self.count * self._width))
         return whole.reshape(self.count, self._width)
@@ -153,7 +153,7 @@ def _free(path: Path) -> Path:
 
 
 class SourceRecord(_Record):
-    """Every frame that came in."""
+    """Record of all received frames."""
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
@@ -164,7 +164,7 @@ class SourceRecord(_Record):
 
 
 class PoseRecord(_Record):
-    """Every pose that was sent, with the cleaned frame that it comes from."""
+    """Record of all sent poses, each with the cleaned frame that it comes from."""
 
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Keep a pose, its standard deviation, and its source."""
@@ -183,7 +183,7 @@ _AnyRecord = TypeVar("_AnyRecord", bound=_Record)
 
 
 class Recordings:
-    """All files that are written when a session is over.
+    """The takes that are written when a session is over.
 
     Parameters
     ----------

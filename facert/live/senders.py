@@ -72,7 +72,7 @@ class UdpSender:
                 self._counters.unsent += 1
 
     def rehearse(self, frame: Frame, pose: Streamed) -> None:
-        """Do everything but send."""
+        """Encode a pose without sending it, to warm up."""
         self._encoder.encode(pose.params, frame.time)
 
     def _connect(self) -> bool:

@@ -128,7 +128,7 @@ class OscDecoder(Decoder):
         return uses
 
     def _wanted(self, one: Message) -> int | None:
-        """Where a message's numbers belong, if they do."""
+        """Index at which a message's numbers belong; None if nowhere."""
         if len(one.numbers) != self._numbers:
             return None
         if one.address.startswith(_VMC):
@@ -172,5 +172,5 @@ class OscEncoder:
         self._bundles = Bundles([*values, message(f"/facert{_FRAME}", 0.0)])
 
     def encode(self, params: FloatArray, time: float) -> list[bytes]:
-        """Every control, and the message that completes the frame."""
+        """Encode every control, and the message that completes the frame."""
         return self._bundles.filled(np.concatenate([params, [time]]))

@@ -122,7 +122,7 @@ def farthest_vertices(rig: Rig, count: int, seed: int = 0) -> IntArray:
 
 
 def _drive(rig: Rig, source: Source) -> IntArray:
-    """For each shape of the rig the weight that drives it, or -1, (P,)."""
+    """Index of the weight that drives each shape of the rig, or -1, (P,)."""
     if source.kind != "weights":
         raise InputError(
             "/source", "weights", "markers", "Give recorded weights, e.g. a Live Link Face CSV."

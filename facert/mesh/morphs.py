@@ -122,7 +122,7 @@ def _directions(weights: FloatArray, basis: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _fewest(weights: FloatArray, basis: FloatArray, allowed: float) -> tuple[int, float]:
-    """How many of the first directions do, and how far a vertex is off without the others."""
+    """Fewest leading directions within the allowed error, and a vertex's largest error then."""
     too_few, enough, error = 0, weights.shape[1], 0.0
     while enough - too_few > 1:
         middle = (too_few + enough) // 2
@@ -135,7 +135,7 @@ def _fewest(weights: FloatArray, basis: FloatArray, allowed: float) -> tuple[int
 
 
 def _dropped(weights: FloatArray, basis: FloatArray, allowed: float) -> float:
-    """How far a vertex goes with these directions; a part of it if that is more than allowed."""
+    """Largest error of a vertex without these directions, or the first one above `allowed`."""
     order = np.argsort(-np.sum(weights**2, axis=1))  # what is too far shows early
     farthest = 0.0
     for start in range(0, len(weights), BATCH):

@@ -41,12 +41,12 @@ class Unlabelled:
 
     @property
     def counts(self) -> dict[str, float]:
-        """The numbers of frames and of poses, as figures of a report."""
+        """Numbers of frames and poses, as figures of a report."""
         return {"unlabelled frames": len(self.X), "unlabelled poses": len(self.Y)}
 
 
 def stacked(labelled: Labelled, unlabelled: Unlabelled) -> tuple[FloatArray, FloatArray]:
-    """All frames (l + m, d_x) and all poses (l + n, d_y), the labelled ones first."""
+    """Stack frames (l + m, d_x) and poses (l + n, d_y), the labelled ones first."""
     return np.vstack([labelled.X, unlabelled.X]), np.vstack([labelled.Y, unlabelled.Y])
 
 
@@ -93,7 +93,7 @@ class Method(Protocol):
 
     @property
     def dimensions(self) -> tuple[int, int]:
-        """d_x and d_y of what it was trained on."""
+        """Dimensions d_x and d_y of the training data."""
         ...
 
     def fit(

@@ -87,12 +87,12 @@ class BlendMap(Map):
 
     @cached_property
     def _direct(self) -> Sequence[int]:
-        """The experts with a weight that are nothing but a process."""
+        """Indices of the experts with a weight that are a process alone."""
         return [expert for expert in (0, 1) if self.weights[expert] > 0.0]
 
     @cached_property
     def _used(self) -> FloatArray:
-        """The weights of those, and of the factors without and with their residual."""
+        """Weights of the experts in use: processes, factors without and with their residual."""
         return np.asarray(self.weights[[*self._direct, 2, 3]])
 
     @cached_property
@@ -207,7 +207,7 @@ def _bounds(unlabelled: Unlabelled, poses: FloatArray) -> FloatArray:
 
 
 def _fewer_poses(unlabelled: Unlabelled, seed: int) -> Unlabelled:
-    """At most `MOST_POSES` of the poses, drawn at random."""
+    """Unlabelled data with at most `MOST_POSES` of the poses, drawn at random."""
     if len(unlabelled.Y) <= MOST_POSES:
         return unlabelled
     rows = np.random.default_rng(seed).permutation(len(unlabelled.Y))[:MOST_POSES]

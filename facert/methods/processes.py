@@ -170,7 +170,7 @@ class ProcessBank:
         return np.asarray(self._noise + np.maximum(prior[:, :, 0] - explained, 0.0))
 
     def _place(self, process: FeatureProcess) -> int:
-        """The index of its features in the list, where they are put if they are new."""
+        """Index in the list of a process's features, appended if they are new."""
         for place, features in enumerate(self._features):
             if features.are_those_of(process):
                 return place

@@ -134,7 +134,7 @@ class SemiSupervisedSGPLVM:
             return self._to_target(self.mapping_.solve(self._observed(frames, input_variance)))
 
     def on(self, device: str) -> Self:
-        """The same, mapping batches on a device; see `Method.on`."""
+        """A copy that maps batches on a device; see `Method.on`."""
         found = find_device(device)
         if found.type == "cpu":
             return self
@@ -186,7 +186,7 @@ class SemiSupervisedSGPLVM:
     def _module(
         self, X: FloatArray, Y: FloatArray, labelled: int, likelihood: ChosenLikelihood
     ) -> SharedGPLVM:
-        """The model to be trained, at its initial parameters.
+        """Build the model to be trained, at its initial parameters.
 
         They are those of the model to begin at. Without one, a small model begins at the alignment
         of both views, and a large one at a small one.

@@ -25,7 +25,7 @@ TUBES = (0.02, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class PackedMap(Map):
-    """All machines in one matrix: a frame costs one product, whatever the number of controls."""
+    """Support vector machines of all controls in one matrix: a frame costs one product."""
 
     predicts_std: ClassVar[bool] = False
 

@@ -1,4 +1,4 @@
-"""Where a method trains."""
+"""Choice of the torch device."""
 
 from __future__ import annotations
 

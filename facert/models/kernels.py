@@ -65,13 +65,13 @@ class Kernel(ABC):
 
     @classmethod
     def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Self:
-        """From (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
+        """Kernel from (log θ1, log θ2, log of the noise above the floor), shape (3,)."""
         with np.errstate(over="ignore"):  # the factorisation refuses what is infinite
             variance, inverse_width, excess = np.exp(log_kernel).tolist()
         return cls(variance, inverse_width, excess + noise_floor)
 
     def to_log(self, noise_floor: float) -> FloatArray:
-        """The inverse of `from_log`.
+        """Log parameters (3,): the inverse of `from_log`.
 
         Noise at the floor is taken to be a little above, or no gradient would lead away from it.
         """

@@ -63,7 +63,7 @@ class PoseEditor:
 
     @property
     def far(self) -> bool:
-        """Whether no known pose comes near what is pinned: then the rest of the pose is a guess."""
+        """Whether the pins are far from every known pose: then the rest of the pose is a guess."""
         if self.known is None or self._start is not None or not self.pins:
             return False
         given = self._given()

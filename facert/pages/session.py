@@ -70,7 +70,7 @@ class PosingSession:
 
     @property
     def model_path(self) -> Path | None:
-        """Where `train` writes the model."""
+        """Path to which `train` writes the model."""
         return None if self.output is None else self.output.with_suffix(".safetensors")
 
     @property
@@ -162,7 +162,7 @@ class PosingSession:
 
 
 def output_beside(take: Path) -> Path:
-    """Where the labels of a take go: ``performance.h5`` to ``performance.posed.h5``."""
+    """Path for the labels of a take: ``performance.posed.h5`` for ``performance.h5``."""
     if take.name.endswith(ENDING):
         return take
     return take.with_name(take.name.removesuffix(take.suffix) + ENDING)

@@ -80,7 +80,7 @@ class Performance:
 
     @cached_property
     def errors(self) -> FloatArray | None:
-        """How far each frame is off, (T,): in the rig's units if there is one, else of a control.
+        """Error of each frame, (T,), in the rig's units if there is one, else of the controls.
 
         Root mean square over vertices or controls; NaN where the truth or the pose is not known.
         """
@@ -93,7 +93,7 @@ class Performance:
         return vertex_errors(off, vertex_gram(self.rig, self.take.controls))
 
     def vertex_errors(self, frame: int) -> FloatArray | None:
-        """How far each vertex is off in a frame, (V,), in the rig's units."""
+        """Error of each vertex in a frame, (V,), in the rig's units."""
         if self.face is None or self.true_face is None:
             return None
         rows = np.array([frame])
@@ -108,7 +108,7 @@ class Performance:
 
     @cached_property
     def _squared_shapes(self) -> FloatArray | None:
-        """How far a control moves each vertex, squared, (P, V)."""
+        """Squared distance by which each control moves each vertex, (P, V)."""
         if self.rig is None or self.take.controls is None:
             return None
         drivers = shape_drivers(self.take.controls.names, self.rig.names)

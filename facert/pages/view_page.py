@@ -132,7 +132,7 @@ class _Faces:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """What the character's colours can show."""
+        """Choices of what the character's colours show."""
         performance = self._performance
         error = (ERROR,) if performance.true_face is not None else ()
         with_std = performance.face is not None and performance.std is not None

@@ -193,7 +193,7 @@ class Timeline:
         self._play.icon = Icon.PLAYER_PAUSE if playing else Icon.PLAYER_PLAY
 
     def _step(self, button: str) -> None:
-        """To the next frame or key pose, or back."""
+        """Step to the next frame or key pose, or back."""
         forward = button.endswith("▸")
         frame = self._playback.frame
         if "key" not in button:

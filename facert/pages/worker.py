@@ -1,4 +1,4 @@
-"""What drives a page: one thread for all its tasks, and the frame that is shown.
+"""The worker of a page, one thread for all its tasks, and the frame that is shown.
 
 As the thread does everything in order, no lock is needed anywhere else.
 """

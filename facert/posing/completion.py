@@ -104,7 +104,7 @@ class Completion:
         return Posed(poses[0], np.sqrt(std[0] ** 2 + spread), drawn)
 
     def sample(self, values: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """A plausible pose for each of the values (B, k), (B, P)."""
+        """Draw a plausible pose (B, P) for each row of values (B, k)."""
         shares, widening = self._nearby(values)
         edges = np.cumsum(shares, axis=1)
         chosen = np.sum(rng.random((len(values), 1)) * edges[:, -1:] > edges, axis=1)

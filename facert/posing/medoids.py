@@ -37,7 +37,7 @@ class MedoidProblem:
     rivals: BoolArray
 
     def weighted(self, weights: FloatArray) -> MedoidProblem:
-        """The same problem with points of different weights above 0, (n,)."""
+        """The problem with points weighted by numbers above 0, (n,)."""
         return MedoidProblem(self.distances * weights[:, None], self.covered * weights, self.rivals)
 
     def medoids(self, count: int) -> IntArray:

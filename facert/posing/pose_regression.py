@@ -62,7 +62,7 @@ class PoseRegression:
         return cls(centre, scale, inputs, distance, product, mean, weights, errors)
 
     def __call__(self, values: FloatArray) -> FloatArray:
-        """The rest, (B, r), of poses with these values of the given controls, (B, k)."""
+        """Predict the other controls, (B, r), from the values of the given ones, (B, k)."""
         inputs = (values - self.centre) / self.scale
         products = inputs @ self.inputs.T / self.product
         return self.mean + _kernel(self.distances(values), products) @ self.weights

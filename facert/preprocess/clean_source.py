@@ -1,4 +1,4 @@
-"""From a take to a clean source in the units of a model, ready to map: the door of `retarget`."""
+"""Cleaning of a take for mapping: a clean source in the units of a model, for `retarget`."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Calibration:
 
 
 def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
-    """The mean of some frames, (d,); NaN where none of them shows anything.
+    """Mean of the frames named as neutral, (d,); NaN where none of them shows anything.
 
     Raises
     ------

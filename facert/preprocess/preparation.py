@@ -1,4 +1,4 @@
-"""From a take as it was recorded to all that is learned from it: the door of `train`."""
+"""Preparation of a recorded take for training: all that `train` learns from."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Prepared:
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """All that is learned from a take, in the take's units, and the units to normalise it by."""
+    """Training data of a take, in the take's units, and the units to normalise it by."""
 
     prepared: Prepared
     # Of the markers or weights that the take was recorded with, seen or not
@@ -130,7 +130,7 @@ def _observed_part(source: Source) -> Source:
 
 
 def _warn_of_zeros(source: Source) -> None:
-    """Some systems write (0, 0, 0) for a marker that was lost."""
+    """Warn of markers at (0, 0, 0), which some systems write for a lost one."""
     if source.kind != "markers":
         return
     zeros = int(np.sum(~source.values.any(axis=2)))

@@ -93,7 +93,7 @@ def _choose_labels(labels: IntArray, settings: Settings, rng: np.random.Generato
 
 
 def _draw(rng: np.random.Generator, indices: IntArray, count: int | None) -> IntArray:
-    """So many of the indices at random, all when there are fewer or for None; in rising order."""
+    """At most `count` of the indices at random, or all for None; in rising order."""
     chosen = rng.permutation(indices)[:count]
     return np.sort(chosen)
 

@@ -53,7 +53,7 @@ class TakeSample:
 
     @classmethod
     def of(cls, take: Take) -> TakeSample:
-        """At most `MOST_FRAMES` frames of a take, and its labels."""
+        """Sample of at most `MOST_FRAMES` frames of a take, and its labels."""
         controls, params, labels = take.controls, take.params, take.labels
         if controls is None or params is None or not len(labels):
             raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
@@ -160,7 +160,7 @@ def sides_by_name(names: Sequence[str]) -> FloatArray:
 
 
 def _name_both(sides: FloatArray) -> bool:
-    """Whether names have either side."""
+    """Whether names occur on both sides."""
     return bool((sides > 0).any() and (sides < 0).any())
 
 

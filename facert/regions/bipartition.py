@@ -77,7 +77,7 @@ def _nearness(places: FloatArray) -> FloatArray:
 
 
 def _order(ties: FloatArray) -> FloatArray:
-    """The second eigenvector of the normalised Laplacian, by which markers are ordered, (M,)."""
+    """Second eigenvector of the normalised Laplacian, by which markers are ordered, (M,)."""
     roots = np.sqrt(np.maximum(ties.sum(axis=1), np.finfo(np.float64).tiny))
     _, vectors = np.linalg.eigh(np.eye(len(ties)) - ties / np.outer(roots, roots))
     return np.asarray(vectors[:, 1] / roots)

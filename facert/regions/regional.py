@@ -189,7 +189,7 @@ class Regional:
         return self._blend(own, frames)
 
     def on(self, device: str) -> Self:
-        """The same with every region's method on the device; see `Method.on`."""
+        """A copy with every region's method on the device; see `Method.on`."""
         there = copy(self)
         there.parts_ = [replace(part, method=part.method.on(device)) for part in self.parts_]
         return there
@@ -250,7 +250,7 @@ class Regional:
         )
 
     def _blend(self, predictions: Sequence[Prediction], frames: FloatArray) -> Prediction:
-        """One prediction of frames (T, d_x); what no region sees of the source stays as it is."""
+        """Blend the regions' predictions of frames (T, d_x); source that no region sees is kept."""
         poses = np.zeros((len(frames), self.layout_.weights.shape[1]))
         variances, seen = np.zeros_like(poses), np.zeros_like(frames)
         has_std = all(prediction.std is not None for prediction in predictions)

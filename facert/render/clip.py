@@ -69,7 +69,7 @@ def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> 
 
 
 def _draw(face: Face, camera: Camera, pixels: int, vertices: FloatArray) -> Pixels:
-    """One face on white."""
+    """Draw one face on white."""
     picture = face.picture(vertices, camera, pixels)
     if picture is None:
         return np.full((pixels, pixels, 3), 255, dtype=np.uint8)

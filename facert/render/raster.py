@@ -87,7 +87,7 @@ def _area(corners: FloatArray) -> FloatArray:
 
 
 def _hits(corners: FloatArray, area: FloatArray, size: int) -> _Hits:
-    """The pixels of each triangle, line by line.
+    """Pixels of each triangle, line by line.
 
     On a line of pixels the three barycentric weights are linear in the column, so that the
     columns where all of them are positive are one span.
@@ -113,7 +113,7 @@ def _hits(corners: FloatArray, area: FloatArray, size: int) -> _Hits:
 
 
 def _lines(corners: FloatArray, size: int, area: FloatArray) -> tuple[IntArray, IntArray]:
-    """Every line of pixels that a triangle reaches: index of the triangle, row."""
+    """Lines of pixels that triangles reach: index of the triangle, and row."""
     low = np.clip(np.ceil(corners[1].min(axis=0)), 0, size).astype(np.int64)
     high = np.clip(np.floor(corners[1].max(axis=0)) + 1, 0, size).astype(np.int64)
     height = np.where(area == 0, 0, np.maximum(high - low, 0))
@@ -122,7 +122,7 @@ def _lines(corners: FloatArray, size: int, area: FloatArray) -> tuple[IntArray, 
 
 
 def _span(slopes: _Pair, starts: _Pair) -> _Pair:
-    """Where on each line the weights s + x m of two corners, and of the third, are not negative.
+    """Span of each line where the weights s + x m of all three corners are not negative.
 
     A hair wider, so that no pixel on the edge of two triangles falls between them.
     """

@@ -79,7 +79,7 @@ def shade(
 
 
 def _cells(chosen: BoolArray, size: int) -> IntArray:
-    """In which pixel of the picture each chosen pixel of the finer drawing lies, (n,)."""
+    """Index of the picture's pixel that each chosen pixel of the finer drawing lies in, (n,)."""
     row, column = np.divmod(np.flatnonzero(chosen), chosen.shape[1])
     return np.asarray(row // _SMOOTHING * size + column // _SMOOTHING)
 
@@ -106,7 +106,7 @@ def _light(surface: Surface, open_sky: FloatArray) -> FloatArray:
 
 
 def _occlusion(fine_depth: FloatArray, cell: IntArray, size: int, reach: float) -> FloatArray:
-    """How much of the sky the surroundings hide, (size * size,).
+    """Share of the sky that the surroundings hide, (size * size,).
 
     A hollow lies behind the mean depth around it.
     """
@@ -124,7 +124,7 @@ def _occlusion(fine_depth: FloatArray, cell: IntArray, size: int, reach: float) 
 
 
 def _blur(image: FloatArray, sigma: float) -> FloatArray:
-    """Nearly a Gaussian: two box filters, whose cost does not grow with their width."""
+    """Approximate Gaussian blur: two box filters, whose cost does not grow with width."""
     width = max(1, round(2.45 * sigma))
     return np.asarray(uniform_filter(uniform_filter(image, width), width))
 

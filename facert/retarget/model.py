@@ -1,4 +1,4 @@
-"""What training leaves: a method, and what it takes to bring a source to it and poses back."""
+"""The result of training: a method, and what brings a source to it and poses back."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def relative_residuals(
 
 
 def novelty_warning(residuals: FloatArray, names: Sequence[str]) -> str | None:
-    """The warning by `relative_residuals` (T, n); None where little is new."""
+    """Warning of frames unlike the posed ones, by `relative_residuals` (T, n); None if few are."""
     new = np.sqrt(np.mean(residuals**2, axis=1)) > NEW
     if new.mean() < LEAST_SHARE:
         return None

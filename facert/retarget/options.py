@@ -1,4 +1,4 @@
-"""How a source is treated before it is mapped, and what is changed about single controls after."""
+"""Options of cleaning a source before it is mapped, and adjustments of single controls after."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class PoseScale:
         return params
 
     def std(self, std: FloatArray | None) -> FloatArray | None:
-        """Their standard deviation from that of normalised poses, (T, P) or (P,)."""
+        """Standard deviation of poses from that of normalised ones, (T, P) or (P,)."""
         return None if std is None else std * self._std_scale
 
 

@@ -108,7 +108,7 @@ class Retargeter(TrainedModel):
         write_model(self, Path(path), overwrite)
 
     def _together(self, take: Take, options: RetargetOptions) -> Take:
-        """All frames at once: smoothed over time, then mapped in one batch."""
+        """Map all frames at once: smoothed over time, then in one batch."""
         found = clean_source(take, self.layout, self.source_units, self.neutral, options)
         adjust = options.adjustments or Adjustments.none(len(self.controls.names))
         predicted = self.method.predict(found.clean, found.input_variance)
@@ -126,7 +126,7 @@ class Retargeter(TrainedModel):
         )
 
     def _one_by_one(self, take: Take, options: RetargetOptions) -> Take:
-        """One frame after the other, as they would come live."""
+        """Map one frame after the other, as they would come live."""
         whole = replace(options, smooth=False)  # what is looked at beforehand is not smoothed
         rest = clean_source(take, self.layout, self.source_units, self.neutral, whole).rest
         stream = self.stream(take.source.names, 1.0 / even_grid(take.time)[1], options, rest)

@@ -38,7 +38,7 @@ LooseParts = Literal["refuse", "carry"]
 
 @dataclass(frozen=True)
 class DrivingMethod:
-    """How labels reach the other vertices."""
+    """Rule by which labels are interpolated to the other vertices."""
 
     # From vertices (V, 3) and faces (F, 3) to a quadratic energy (V, V)
     energy: Energy | None = None

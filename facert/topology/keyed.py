@@ -65,11 +65,11 @@ class KeyedPerformance:
 
     @property
     def explaining(self) -> FloatArray:
-        """For each target the part of the source that it follows, (G, T, d)."""
+        """Part of the source that each target follows, (G, T, d)."""
         return self.source.transpose(1, 0, 2) if self.by_point else self.frames[None]
 
     def less(self, estimate: FloatArray) -> KeyedPerformance:
-        """The same source, with what an estimate (T, G, C) leaves of the key poses."""
+        """The performance with the key poses less an estimate (T, G, C), at the same source."""
         return KeyedPerformance(self.source, self.keys, self.labels - estimate[self.keys])
 
 

@@ -37,14 +37,14 @@ def checked_labels(labels: ArrayLike, points: int) -> IntArray:
 
 
 def needed_labels(dim: int, coordinates: int) -> int:
-    """How many labels hold a component whose points have so many coordinates, at least."""
+    """Least number of labels that fix a component whose points have so many coordinates."""
     return coordinates + 1 if dim >= coordinates else 1
 
 
 def lacking_components(
     neighbourhoods: Neighbourhoods, labelled: IntArray, needed: int = 1
 ) -> IntArray:
-    """The numbers of the components that have fewer labels than needed."""
+    """Components, by number, that have fewer labels than needed."""
     components = neighbourhoods.components
     there = np.bincount(components)
     held = np.bincount(components[labelled], minlength=len(there))

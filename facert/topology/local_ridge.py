@@ -57,7 +57,7 @@ def _nearness(rest: FloatArray) -> FloatArray:
 
 
 def _kernel_ridge(take: KeyedPerformance, first: FloatArray, weights: FloatArray) -> FloatArray:
-    """What a first estimate (T, G, C) leaves of the target, with weights w_pq (G, M), (T, G, C)."""
+    """Ridge estimate of the target less a first one (T, G, C), with weights w_pq (G, M)."""
     left = take.less(first).labels
     mean = left.mean(axis=0)
     targets = (left - mean).transpose(1, 0, 2)

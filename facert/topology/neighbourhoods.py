@@ -36,7 +36,7 @@ class Neighbourhoods:
 
     @cached_property
     def components(self) -> IntArray:
-        """For each point the number of the connected component that it belongs to, (N,).
+        """Number of the connected component that each point belongs to, (N,).
 
         Points are connected when they share a neighbourhood: nothing else carries a label to them.
         """

@@ -23,7 +23,7 @@ log = logging.getLogger("facert")
 
 @dataclass(frozen=True)
 class Propagation:
-    """How to propagate; see `facert.topology.propagation.propagate`."""
+    """Options of propagation; see `facert.topology.propagation.propagate`."""
 
     method: str = "residual"
     width: int | None = None
@@ -33,7 +33,7 @@ class Propagation:
     limits: LimitRule = "auto"
 
     def run(self, source: FloatArray, keys: IntArray, labels: FloatArray) -> FloatArray:
-        """All frames (T, G, C) from source points (T, M, D) and key poses (K, G, C)."""
+        """Propagate to all frames (T, G, C) from source points (T, M, D), key poses (K, G, C)."""
         performance = KeyedPerformance(source, keys, labels)
         return propagate(performance, self.method, self.width, self.dim)
 
@@ -158,7 +158,7 @@ def _keys_with(values: FloatArray, keys: Sequence[int], field: str) -> IntArray:
 
 
 def _partners(source: Source, target: Source) -> IntArray | None:
-    """For each target marker the source marker of its name; None unless all have one."""
+    """Index of the source marker with each target marker's name; None unless all have one."""
     index = NameIndex(source.names)
     found = [index.find(name) for name in target.names]
     if source.kind == "markers" and None not in found and len(set(found)) == len(found):

@@ -160,7 +160,7 @@ def _solve(
 def _by_source(
     take: KeyedPerformance, sources: FloatArray, solution: Callable[[FloatArray], Interpolant]
 ) -> FloatArray:
-    """All frames from the key poses, each by the interpolant of its source, (T, G, C)."""
+    """Propagate key poses to all frames, each by the interpolant of its source, (T, G, C)."""
     parts = np.array_split(take.labels, len(sources), axis=1)
     solved = [solution(X)(part) for X, part in zip(sources, parts, strict=True)]
     return np.concatenate(solved, axis=1)

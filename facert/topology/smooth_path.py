@@ -71,14 +71,14 @@ class SmoothPath:
         return np.asarray(self.influence @ between_keys / between_keys.diagonal().mean())
 
     def missed(self, take: KeyedPerformance) -> float:
-        """ε: how far the path through the source's key frames is off, as a share of its motion."""
+        """Error ε of the path through the source's key frames, as a share of its motion."""
         motion = float(np.linalg.norm(take.frames - take.frames.mean(axis=0)))
         path = self.influence @ take.frames[take.keys]
         return float(np.linalg.norm(path - take.frames)) / motion if motion > 0 else 0.0
 
 
 def trust_in_path(by_path: float, by_map: float) -> float:
-    """τ, the variance that the path is given, from 0 to 30.
+    """The path's variance τ in the kernel, from 0 to 30.
 
     Parameters
     ----------

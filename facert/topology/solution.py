@@ -31,7 +31,7 @@ class Dense:
     influence: FloatArray  # (N, M): A: how much of each label reaches each point; rows add up to 1
 
     def __call__(self, labels: FloatArray) -> FloatArray:
-        """All points Y = A Ŷ, (N, ...), from labels (M, ...); any number of coordinates."""
+        """Points Y = A Ŷ, (N, ...), from labels (M, ...); any number of coordinates."""
         flat = labels.reshape(len(labels), -1)
         with one_thread():
             # Transposed: BLAS is quicker at (few, M) times (M, N) than the other way round.
@@ -78,7 +78,7 @@ class Elimination:
         return Y.reshape(self._points, *labels.shape[1:])
 
     def green(self, point: int) -> FloatArray:
-        """How all points give way to a unit force on one of them, (N,): a column of B₂₂⁻¹."""
+        """Response of all points to a unit force on one of them, (N,): a column of B₂₂⁻¹."""
         response = np.zeros(self._points)
         force = (self._free == point).astype(np.float64)
         response[self._free] = self._solved(force[:, None])[:, 0]

@@ -123,7 +123,7 @@ class _PredictedShapes:
 
     @property
     def squared_errors(self) -> FloatArray:
-        """How much each vertex is missed, (V,)."""
+        """Squared error of each vertex, (V,)."""
         return np.asarray(np.einsum("vp,vp->v", self._errors, self._errors))
 
     def add(self, vertex: int) -> None:
@@ -144,7 +144,7 @@ def _evened(shapes: FloatArray) -> FloatArray:
 
 
 def mirror_vertices(neutral: FloatArray) -> IntArray:
-    """The vertex opposite to each, (V,): itself on the middle line, or where there is none.
+    """Index of each vertex's mirror image, (V,): itself on the middle line, or without one.
 
     The plane is square to an axis, halfway along it. Where less than 95 % of the vertices find
     their opposite, a face is not symmetric, and every vertex is its own.

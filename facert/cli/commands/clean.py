@@ -74,7 +74,7 @@ def _clean(
     target: str | None,
     overwrite: bool,
 ) -> None:
-    """One take."""
+    """Clean one take and report what changed."""
     from facert.retarget.options import RetargetOptions
 
     take = read_observed(source, target, no_detect)

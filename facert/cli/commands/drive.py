@@ -110,7 +110,7 @@ def _in_units(mesh: Mesh, unit: str | None) -> Mesh:
 
 
 def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) -> InputError:
-    """What to do about points that lie far from the mesh, given what was asked for."""
+    """The error with a fix for points that lie far from the mesh, given the options."""
     from facert.data.units import in_metres
     from facert.errors import InputError
 

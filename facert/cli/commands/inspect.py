@@ -37,7 +37,7 @@ def command(
 
 
 def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]:
-    """What a file holds, ready for JSON."""
+    """Facts about a file's content, ready for JSON."""
     if path.suffix.lower() == ".safetensors":
         from facert.retarget.retargeter import load
 
@@ -60,7 +60,7 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 
 
 def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a model, for people: the settings that its method uses, and plain names of figures."""
+    """Facts about a model with only the settings that its method uses, and plain names."""
     from facert.methods.registry import method_class
     from facert.settings import OF_SHARED
 

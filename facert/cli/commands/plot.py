@@ -52,7 +52,7 @@ def command(
 
 
 def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:
-    """Both with the controls that they share, in the spelling of the take."""
+    """The two takes with the controls that they share, in the spelling of the first."""
     from facert.data.shared_controls import require_shared
 
     fix = "Give the truth of this take, or choose another --target."

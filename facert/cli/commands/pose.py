@@ -168,7 +168,7 @@ def _frame(take: Take, frame: int) -> Take:
 
 
 def _table(done: CompletedPose, soft: float) -> Table:
-    """What was given, then the others by size; those at rest are counted below."""
+    """Table of controls: the given ones, then others by size; those at rest are counted below."""
     import numpy as np
     from rich import box
     from rich.table import Table
@@ -198,14 +198,14 @@ def _table(done: CompletedPose, soft: float) -> Table:
 
 
 def _mark(done: CompletedPose, name: str, soft: float) -> str:
-    """Where a control's value comes from, if not from the others'."""
+    """Remark on where a control's value comes from, empty when the model completed it."""
     if name in done.given:
         return f"near {done.given[name]:g}" if soft else "given"
     return "held" if name in done.held else ""
 
 
 def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:
-    """A take with a pose a frame, or JSON."""
+    """Write a take with a pose a frame, or JSON."""
     from facert.io.formats import write_take_file
 
     if output.suffix.lower() == ".json":

@@ -105,7 +105,7 @@ def _keys(keys: str, every: int | None, posed: IntArray, frames: int) -> list[in
 
 
 def _error(result: Take, truth: Take, keys: list[int]) -> str:
-    """How far off the frames are whose truth is known, besides the keys; nothing if none is."""
+    """RMS error at frames other than keys whose truth is known, as text; empty if none is."""
     import numpy as np
 
     from facert.data.arrays import rms

@@ -97,7 +97,7 @@ def _retarget(
     device: str,
     overwrite: bool,
 ) -> None:
-    """One take."""
+    """Retarget one take and report its error."""
     import time
 
     import facert
@@ -118,14 +118,14 @@ def _retarget(
 
 @lru_cache(maxsize=1)
 def _loaded(model: Path, _stamp: tuple[int, int]) -> Retargeter:
-    """Read once a process, however many takes there are, until the file changes."""
+    """The model of a file, read once a process until the file changes."""
     import facert
 
     return facert.load(model)
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """What changes with a file; nothing where there is none, which reading then reports."""
+    """Modification time and size of a file; zeros where there is none, which reading reports."""
     try:
         found = path.stat()
     except OSError:

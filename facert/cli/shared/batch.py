@@ -83,7 +83,7 @@ def require_kept(todo: Plan, *others: Path | None) -> None:
 
 
 def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
-    """Do it, several files at a time if asked; ends the command with status 1 if any failed."""
+    """Carry out a plan, several files at a time if asked; exits with status 1 if any failed."""
     if not todo.many:
         work(*todo.pairs[0])
         return
@@ -105,7 +105,7 @@ def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
 def _single(
     paths: Sequence[Path], many: dict[str, object], overwrite: bool, kinds: tuple[Kind, ...]
 ) -> Plan:
-    """One file, IN to OUT, without the options for many."""
+    """The plan for a single file, IN to OUT, without the options for many."""
     if len(paths) != 2:
         raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
     for option, given in many.items():
@@ -120,7 +120,7 @@ def _single(
 
 
 class _SecondPathExistsError(OutputExistsError):
-    """Of two paths the second one exists: perhaps both are takes to read."""
+    """Error that the second of two paths exists: perhaps both are takes to read."""
 
     def __str__(self) -> str:
         return f"{super().__str__().removesuffix('.')}; for two takes, --out-dir DIR."

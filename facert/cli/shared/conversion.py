@@ -27,7 +27,7 @@ KINDS: tuple[Kind, ...] = ("take", "rig", "morphs")
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to read of the input: see `facert.io.formats.read_any`; and the rig of a take."""
+    """Options of reading the input, see `facert.io.formats.read_any`, and the rig of a take."""
 
     kind: formats.TakeOrRig | None = None
     target: str | None = None
@@ -67,7 +67,7 @@ def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overw
 
 
 def _content(take: Take, output: Path) -> str:
-    """What of a take its file holds: all, or the poses, or else the source."""
+    """Description of what of a take was written: all, the poses, or else the source."""
     frames = plural(len(take), "frame")
     source = plural(len(take.source.names), take.source.kind[:-1])
     poses = plural(len(take.labels), "pose")

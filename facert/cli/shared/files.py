@@ -46,7 +46,7 @@ def require_other_file(source: Path, output: Path, name: str) -> None:
 
 
 def identity(path: Path) -> tuple[int, int]:
-    """The same for every name of a file: other spellings, symbolic and hard links."""
+    """Device and inode of a file: equal for all its names, symbolic and hard links."""
     found = path.stat()
     return found.st_dev, found.st_ino
 

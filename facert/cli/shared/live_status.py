@@ -87,7 +87,7 @@ def _pace(pace: Pace) -> str:
 
 
 def _counts(counters: Counters) -> str:
-    """The counters: those that every session has, and others that are not 0."""
+    """Text of the counters: those that every session has, and others that are not 0."""
     always = f"{counters.mapped} mapped, {counters.dropped} dropped, {counters.bad} bad"
     others = {
         "late or double": counters.late,

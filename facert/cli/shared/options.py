@@ -102,7 +102,7 @@ def numbers(text: str, option: str) -> list[int]:
 
 @dataclass(frozen=True)
 class MappingOptions:
-    """What the options of a command ask for, of takes that go through a model."""
+    """Options of a command that maps takes through a model."""
 
     controls: Path | None
     no_detect: bool
@@ -111,7 +111,7 @@ class MappingOptions:
     neutral: str | None = None
 
     def __call__(self, retargeter: Retargeter) -> RetargetOptions:
-        """The same for this model."""
+        """Retargeting options for a model, with its controls' adjustments read from the file."""
         from facert.data.ranges import parse_frames
         from facert.errors import reading
         from facert.io.toml import read_toml

@@ -40,7 +40,7 @@ def key_attributes(path: str, node: str = "") -> None:
 
 
 def _attributes(node: str) -> list[str]:
-    """What can be keyed of a node: a blendShape's weights by the names of its targets."""
+    """Keyable attributes of a node: a blendShape's weights by the names of its targets."""
     if not node or not cmds.objExists(node):
         return []
     return cmds.listAttr(node, keyable=True, multi=True) or []

@@ -45,7 +45,7 @@ def keys(curves: Curves, name: str) -> list[Key]:
 
 
 def spelling(name: str) -> str:
-    """What ``eyeBlink_L``, ``EyeBlinkLeft`` and ``eye-blink.left`` have in common."""
+    """Common spelling of ``eyeBlink_L``, ``EyeBlinkLeft`` and ``eye-blink.left``."""
     name = re.sub(r"(?<=[a-z0-9])[LR]$|[._-][lLrR]$", _side, name)
     return re.sub(r"[^a-z0-9]", "", name.lower())
 

@@ -30,7 +30,7 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 
 @dataclass(frozen=True, eq=False)
 class CensoringLimits:
-    """How far controls go, infinite where poses do not pile up."""
+    """Limits at which poses pile up, a pair a control; infinite where they do not."""
 
     # (d_y,)
     low: FloatArray

@@ -105,7 +105,7 @@ class _Profile:
         return value, np.array(gradient)
 
     def kernel(self, v: FloatArray) -> RegressionKernel:
-        """In the units of the data, with the best scale."""
+        """The kernel in the units of the data, with the best scale."""
         w, nu, lam = np.exp(v).tolist()
         R_inverse, _ = self._inverse(squared_exponential(self.D, 1.0, w), nu, lam)
         s = self._scale(R_inverse @ self.Y)

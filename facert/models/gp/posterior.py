@@ -66,7 +66,7 @@ class Predictor:
         self.identity, self.zero = np.eye(len(self.Z_T)), np.zeros(1)
 
     def on(self, device: torch.device) -> Self:
-        """The same on a torch device; it takes tensors, see `there`, and returns them."""
+        """A copy on a torch device that takes tensors, see `there`, and returns them."""
         moved = copy(self)
         moved.device = device
         for name in ("Z", "stacked", "whitener", "Z_T", "identity", "zero"):
@@ -81,7 +81,7 @@ class Predictor:
         return cast(FloatArray, tensor)
 
     def here(self, array: FloatArray) -> FloatArray:
-        """The inverse of `there`."""
+        """Convert an array of this predictor back to NumPy: the inverse of `there`."""
         return array if self.device is None else cast("torch.Tensor", array).cpu().numpy()
 
     @property

@@ -53,7 +53,7 @@ class Residual:
     columns: int  # d
 
     def repeats(self, variance: Tensor) -> Tensor:
-        """The value of w rows that are alike, of such variances (n,), less that of one at 1/w."""
+        """-log N of w equal rows with these variances (n,), less that of one row at 1/w of it."""
         logs = (self.weights - 1.0) * (2.0 * math.pi * variance).log() + self.weights.log()
         return 0.5 * self.columns * logs.sum()
 
@@ -62,15 +62,15 @@ class Approximation(Protocol):
     """A treatment of the residual."""
 
     def diagonal(self, residual: Residual) -> Tensor:
-        """Λ, (n,)."""
+        """The diagonal Λ, (n,)."""
         ...
 
     def penalty(self, residual: Residual) -> Tensor:
-        """The value less -log N(0, Q + Λ), a scalar."""
+        """The objective less -log N(0, Q + Λ), a scalar."""
         ...
 
     def slopes(self, h: Tensor, residual: Residual) -> tuple[Tensor, Tensor]:
-        """Of the value along the diagonal of K - Q, (n,), and along the noise.
+        """Slopes of the objective along the diagonal of K - Q, (n,), and along the noise.
 
         `h` (n,) is the slope of -log N(0, Q + Λ) along Λ.
         """
@@ -81,7 +81,7 @@ class VFE:
     """The collapsed variational bound."""
 
     def diagonal(self, residual: Residual) -> Tensor:
-        """The noise alone."""
+        """Λ is the noise alone."""
         return residual.noise / residual.weights
 
     def penalty(self, residual: Residual) -> Tensor:
@@ -91,7 +91,7 @@ class VFE:
         return 0.5 * residual.columns / residual.noise * trace + repeats
 
     def slopes(self, h: Tensor, residual: Residual) -> tuple[Tensor, Tensor]:
-        """The trace term's along K - Q; the noise is in Λ, in the trace term and in the repeats."""
+        """Along K - Q the trace term's; the noise is in Λ, in the trace term and in the repeats."""
         w, s = residual.weights, residual.noise
         along = 0.5 * residual.columns / s * w
         rest = 0.5 * residual.columns / s * (w - 1.0) - along * residual.variance / s
@@ -102,11 +102,11 @@ class FITC:
     """The fully independent training conditional."""
 
     def diagonal(self, residual: Residual) -> Tensor:
-        """The noise and the residual."""
+        """Λ is the noise and the residual."""
         return (residual.variance + residual.noise) / residual.weights
 
     def penalty(self, residual: Residual) -> Tensor:
-        """Nothing but for repeated rows."""
+        """FITC has a penalty for repeated rows only."""
         return residual.repeats(residual.variance + residual.noise)
 
     def slopes(self, h: Tensor, residual: Residual) -> tuple[Tensor, Tensor]:
@@ -233,7 +233,7 @@ def sparse_negative_log_likelihood(
 
 @dataclass(frozen=True)
 class _Slopes:
-    """Of the value along K_mn (m, n), K_mm (m, m), diag(K - Q) (n,) and the noise."""
+    """Slopes of the value along K_mn (m, n), K_mm (m, m), diag(K - Q) (n,) and the noise."""
 
     K_mn: Tensor
     K_mm: Tensor

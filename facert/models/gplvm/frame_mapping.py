@@ -113,7 +113,7 @@ class FrameMapping(SourceMapping):
         return None
 
     def frame_energy(self, z: FloatArray, b: FloatArray, R: FloatArray) -> float:
-        """F(z)."""
+        """The energy F(z) of a frame b (d_x,) seen with variance R (d_x,)."""
         return _data_term(self.point(z), b, R).energy
 
     def expand_frame(

@@ -131,6 +131,6 @@ class SharedGPLVM(nn.Module):
         return self.Z.detach()[view.rows].cpu().numpy()
 
     def posteriors(self) -> tuple[Predictor, Predictor]:
-        """Both views given their observations, for source and for target mapping."""
+        """The posteriors of both views, for source and for target mapping."""
         source, target = (view.posterior(self.latents(view)) for view in (self.source, self.target))
         return source, target

@@ -74,14 +74,14 @@ class Observation:
         return cls(np.where(seen, X, 0.0), np.where(seen, variance, np.inf))
 
     def following(self, previous: FloatArray, sigma_t: float) -> Observation:
-        """With the pull of the previous cleaned frame, (B, d_x), added: Eq. (14)."""
+        """Observation with the pull of the previous cleaned frame, (B, d_x), added: Eq. (14)."""
         precision = 1.0 / self.variance
         total = precision + sigma_t**-2
         mean = (precision * self.mean + sigma_t**-2 * previous) / total
         return Observation(mean, 1.0 / total)
 
     def __getitem__(self, rows: slice | FloatArray) -> Observation:
-        """Some of the frames."""
+        """The observation of some of the frames."""
         return Observation(self.mean[rows], self.variance[rows])
 
 

@@ -1,4 +1,4 @@
-"""Where training begins if not at the alignment of both views: at a model that is trained.
+"""Training that begins at a trained model, in place of the alignment of both views.
 
 That may be the model of a moment ago, to which a label was added. And for a large set it is a small
 one of the same take: a few rows of each view, the core, are trained as the paper does, exactly.
@@ -46,7 +46,7 @@ class Core:
         return cls(rows_x, rows_y, len(labels))
 
     def is_all_of(self, X: FloatArray, Y: FloatArray) -> bool:
-        """Whether there are no others."""
+        """Whether the core holds every row of both views."""
         return len(self.rows_x) == len(X) and len(self.rows_y) == len(Y)
 
 
@@ -69,18 +69,18 @@ class TrainedViews:
 
     @classmethod
     def at(cls, source: Predictor, target: Predictor) -> TrainedViews:
-        """At a model of the same units."""
+        """Trained views whose units are those of the new model."""
         same = (Normalisation(np.zeros(view.columns), 1.0) for view in (source, target))
         return cls(source, target, *same)
 
     @property
     def latent_dim(self) -> int:
-        """Q."""
+        """Number of latent dimensions q."""
         return int(self.source.Z.shape[1])
 
     @property
     def kernels(self) -> tuple[Kernel, Kernel]:
-        """Of the source and of the target, in the units of the other model."""
+        """Kernels of source and target, in the units of the other model."""
         return (
             _divided(self.source.kernel, self.source_units.scale),
             _divided(self.target.kernel, self.target_units.scale),

@@ -35,7 +35,7 @@ class LBFGS:
         return initial_state(objective, x)[0]
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
-        """At most so many further iterations; `watch` sees each and may end the run."""
+        """Run at most so many further iterations; `watch` sees each and may end the run."""
         stage = _Stage(objective, state, watch)
         found = minimize(
             stage.evaluate,
@@ -74,7 +74,7 @@ class _Stage:
         return value, gradient
 
     def _steep(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """In place of infinity, which SciPy's line search cannot take.
+        """A large finite value for infinity, which SciPy's line search cannot take.
 
         A parabola from the state through x, so steep that its minimum is a tenth of the way.
         """

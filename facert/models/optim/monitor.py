@@ -32,7 +32,7 @@ class Monitor:
     """
 
     def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  a hook
-        """Where an earlier run with this fingerprint stopped, or None to begin anew."""
+        """State at which an earlier run with this fingerprint stopped, or None to begin anew."""
         return None
 
     def iteration(self, state: State) -> None:

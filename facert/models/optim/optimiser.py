@@ -17,7 +17,7 @@ Status = Literal["converged", "iteration limit", "stalled", "interrupted"]
 
 @dataclass(frozen=True)
 class State:
-    """Where a minimisation stands after an iteration."""
+    """State of a minimisation after an iteration."""
 
     x: FloatArray  # (n,): Best vector so far
     value: float  # Objective at x
@@ -40,13 +40,13 @@ class Optimiser(Protocol):
         ...
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
-        """At most so many further iterations; `watch` sees each descent and may end the run."""
+        """Run at most so many further iterations; `watch` sees each descent and may end the run."""
         ...
 
 
 @dataclass(frozen=True)
 class Result:
-    """How a minimisation ended."""
+    """Outcome of a minimisation."""
 
     # Objective and norm of its gradient at the end
     value: float

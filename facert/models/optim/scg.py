@@ -62,7 +62,7 @@ class SCG:
         return replace(state, memory=_Memory(gradient, -gradient, SCALE_START).arrays())
 
     def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
-        """At most so many further iterations; `watch` sees each descent and may end the run."""
+        """Run at most so many further iterations; `watch` sees each descent and may end the run."""
         for _ in range(iterations):
             before = state.value
             state = self._step(objective, state)

@@ -26,12 +26,12 @@ def comparison_section(sections: Sequence[Section]) -> Section | None:
 
 
 def _name(section: Section) -> str:
-    """Of the file, without what kind of result it is."""
+    """Name of the file, without the kind of result before it."""
     return section.title.partition(": ")[2] or section.title
 
 
 def _parts(found: Sequence[Comparison]) -> tuple[str, ...]:
-    """Every part of the face that some result has, in the order of the most complete one."""
+    """Parts of the face that any result has, in the order of the most complete one."""
     fullest = sorted(found, key=lambda one: -len(one.groups))
     return tuple(dict.fromkeys(group.name for one in fullest for group in one.groups))
 

@@ -69,7 +69,7 @@ def _section(name: str, settings: Mapping[str, Any], rows: list[EvaluationRow]) 
 
 
 def _tables(rows: Sequence[EvaluationRow]) -> Iterator[Table]:
-    """One for each number of labels and of unlabelled data, the best method marked."""
+    """Tables, one for each number of labels and of unlabelled data; the best method is marked."""
     columns = columns_of(rows)
     for section, least in sections_of(rows):
         caption = f"{plural(section[0].labels, 'label')}, {section[0].unlabelled} unlabelled"

@@ -163,7 +163,7 @@ def _stated(path: Path) -> str:
 
 
 def _read(paths: list[Path], read: Callable[[Path], Thing]) -> dict[Path, Thing]:
-    """What is in some files; those that cannot be read are named and passed over."""
+    """Read some files; those that cannot be read are named in the log and skipped."""
     found = {}
     for path in paths:
         try:

@@ -48,7 +48,7 @@ def performance_section(
 
 
 def fits(rig: Rig, take: Take) -> bool:
-    """Whether a rig has a shape for every control of a take."""
+    """Whether the rig has a shape for every control of the take."""
     return take.controls is not None and drives(rig, take.controls.names)
 
 

@@ -122,7 +122,7 @@ class Motion(ArrayGroup):
 
 
 def _spread(indices: IntArray, most: int) -> IntArray:
-    """So many of them at most, evenly spread."""
+    """At most so many of the frames, evenly spread."""
     count = len(indices)
     return indices[np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))]
 

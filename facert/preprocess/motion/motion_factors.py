@@ -100,15 +100,15 @@ class MotionFactors(ArrayGroup):
         return int(self.weights.shape[1])
 
     def with_noise(self, more: float, least: float = 0.0) -> MotionFactors:
-        """The same with so much more (or less) noise in every column, at least so much."""
+        """The factors with `more` (or less) noise in every column, and at least `least`."""
         return MotionFactors(self.mean, self.weights, np.maximum(self.noise + more, least))
 
     def scaled(self, deviation: FloatArray) -> MotionFactors:
-        """The same for factors in units of their standard deviation, (q,)."""
+        """The factors in units of their standard deviation, (q,)."""
         return MotionFactors(self.mean, self.weights * deviation, self.noise)
 
     def _turned(self) -> MotionFactors:
-        """The same with factors that are independent given a frame, the most certain first."""
+        """The factors turned to be independent given a frame, the most certain first."""
         _, turn = np.linalg.eigh(self.weights.T @ (self.weights / self.noise[:, None]))
         return MotionFactors(self.mean, self.weights @ turn[:, ::-1], self.noise)
 

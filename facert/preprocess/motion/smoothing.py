@@ -151,7 +151,7 @@ def factor_update(P: FloatArray, precision: FloatArray) -> FactorUpdate:
 
 
 def _settled(P: FloatArray, last: FloatArray) -> bool:
-    """Whether covariances (..., n, n) are what they were."""
+    """Whether covariances (..., n, n) have stopped changing."""
     deviation = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
     scale = deviation[..., :, None] * deviation[..., None, :]
     return bool((np.abs(P - last) <= SETTLED * scale).all())
@@ -165,7 +165,7 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 def _smoothed(
     filtered: list[FactorUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> Smoothed:
-    """Back over the frames; `before` and `after`, (T, ..., 2 q), are means, and are changed."""
+    """The backward pass; `before` and `after`, (T, ..., 2 q), are means, and are changed."""
     frames, q = len(filtered), F.shape[0] // 2
     P = filtered[-1].after
     covariance = np.empty((frames, *P.shape[:-2], q, q))
@@ -234,7 +234,7 @@ def _series_filtered(seen: BoolArray, noise: float, chain: SeriesChain) -> list[
 def _series_smoothed(
     filtered: list[SeriesUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """As `_smoothed`: mean and variance of the value, (T, d)."""
+    """Smoothed mean and variance of the value, (T, d); arguments as of `_smoothed`."""
     frames, P = len(filtered), filtered[-1].after
     variance = np.empty((frames, P.shape[1]))
     variance[-1] = P[0]
@@ -267,7 +267,7 @@ def carried(F: FloatArray, m: FloatArray) -> FloatArray:
 
 
 def _series_settled(P: FloatArray, last: FloatArray) -> bool:
-    """Whether covariances (3, d) are what they were."""
+    """Whether covariances (3, d) have stopped changing."""
     scale = np.stack([P[0], np.sqrt(P[0] * P[2]), P[2]])
     return bool((np.abs(P - last) <= SETTLED * scale).all())
 
@@ -308,7 +308,7 @@ def series_after(P: FloatArray, gain: FloatArray) -> FloatArray:
 
 
 def forward_covariance(F: FloatArray) -> FloatArray:
-    """Takes the covariance of value and velocity one frame on, (3, 3, d), by `transition` F."""
+    """Matrices (3, 3, d) that carry covariances of value and velocity one frame on by F."""
     (p, q), (r, s) = F
     return np.array(
         [
