@@ -43,7 +43,7 @@ ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")
 
 
 class _Commands(Group):
-    """Typer ends without a word at Ctrl-C; the exit status is the one that shells expect."""
+    """Group of commands that ends at Ctrl-C in silence, with the exit status shells expect."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Let the options about messages stand after the command as well as before it."""
@@ -85,7 +85,7 @@ def options(
         bool, option("Print the version.", "--version", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Options before or after the command."""
+    """Handle the options that may stand before or after the command."""
     console.configure(quiet, verbose)
 
 
@@ -132,12 +132,12 @@ def main() -> None:
 
 
 def _of_system(error: OSError) -> str:
-    """The system's word for what went wrong, with the file if it is about one."""
+    """The operating system's error message, with the file if it is about one."""
     where = f"{error.filename}: " if error.filename else "input or output: "
     return where + (error.strerror or str(error))
 
 
 def _drop_output() -> None:
-    """Let what standard output could not take be lost: Python would try again at its end."""
+    """Discard output that could not be written: Python would try again at its end."""
     with suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123
         os.dup2(nowhere.fileno(), sys.stdout.fileno())

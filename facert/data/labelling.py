@@ -57,7 +57,7 @@ def labelled(take: Take, poses: Poses) -> Take:
 
 
 def _known(poses: Poses) -> Poses:
-    """The rows that are poses, whose names are checked."""
+    """Rows of the poses that are known, with their names checked."""
     names = checked_names(poses.names, poses.values.shape[1], "names of the controls")
     known = np.asarray(~np.isnan(poses.values).all(axis=1))
     if not known.any():
@@ -81,7 +81,7 @@ def _by_number(take: Take, poses: Poses) -> IntArray:
 
 
 def _by_time(take: Take, poses: Poses) -> IntArray:
-    """The nearest frame of each pose."""
+    """Index of the frame nearest in time to each pose."""
     assert poses.time is not None
     frames = nearest_frames(take.time, poses.time)
     distance = np.abs(take.time[frames] - poses.time)
@@ -102,7 +102,7 @@ def _require_different(frames: IntArray) -> None:
 
 
 def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:
-    """The controls of both, and where each of them stands among the columns of the poses."""
+    """Controls of take and poses, and the column of each in the poses."""
     if take.controls is None or (not len(take.labels) and take.animation is None):
         return Controls(poses.names, poses.limits), np.arange(len(poses.names))
     order = match(take.controls.names, poses.names, "names of the poses")

@@ -151,7 +151,7 @@ def fitting(pattern: str, names: Sequence[str]) -> list[int]:
 
 
 def instead_of(name: str, among: Sequence[str]) -> str | None:
-    """The names that a person may have meant by one that is not there, for a message.
+    """Suggestions for a name that is not there, for a message.
 
     >>> instead_of("smile", ["smile_L", "smile_R"]), instead_of("smille_L", ["smile_L", "smile_R"])
     ("'smile*' for both sides", "'smile_L'")
@@ -173,7 +173,7 @@ def _without_side(name: str) -> tuple[str, ...]:
 def _require_different(
     found: IntArray, wanted: Sequence[str], among: Sequence[str], field: str
 ) -> None:
-    """Refuse that one name stands for two: one of them is missing."""
+    """Refuse names that match the same name of the list: one of them is missing."""
     shared = np.flatnonzero(np.bincount(found, minlength=1) > 1)
     if not len(shared):
         return
@@ -186,7 +186,7 @@ def _require_different(
 
 
 def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
-    """Which of a rig's shapes each control drives, whatever the spelling of either.
+    """Matrix of the rig's shapes that each control drives, whatever the spelling of either.
 
     A control drives the shape of its name; where the rig has a left and a right half of it
     instead, both. The result (P, K) is 1 where a control drives a shape, else 0: poses (n, P) times

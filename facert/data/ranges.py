@@ -68,7 +68,7 @@ def _numbers(
 
 
 def _span(steps: range, high: int, option: str) -> set[int]:
-    """The steps, and the upper end."""
+    """Multiples of the step from the lower end, and the upper end."""
     if len(steps) > MOST:
         raise InputError(option, f"at most {MOST} numbers", f"{len(steps)}", "Take larger steps.")
     return {*steps, high}

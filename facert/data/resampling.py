@@ -84,7 +84,7 @@ def _new_times(take: Take, fps: float) -> FloatArray:
 
 
 def nearest_frames(time: FloatArray, wanted: FloatArray) -> IntArray:
-    """Which of rising times, (T,), is nearest to each wanted one, (n,)."""
+    """Index of the rising times, (T,), that is nearest to each wanted one, (n,)."""
     after = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
     before = np.maximum(after - 1, 0)
     closer = np.abs(time[before] - wanted) <= np.abs(time[after] - wanted)

@@ -134,7 +134,7 @@ def _blinks(seconds: float, rng: np.random.Generator) -> Gestures:
 
 
 def _restlessness(time: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A living face is never quite still: slow waves of a few hundredths, (T, 26)."""
+    """Small motion of a resting face: slow waves of a few hundredths, (T, 26)."""
     shape = (6, len(ACTIVATIONS))
     rate, phase = rng.uniform(0.1, 0.7, shape), rng.uniform(0, 2 * np.pi, shape)
     waves = np.sin(2 * np.pi * rate * time[:, None, None] + phase)

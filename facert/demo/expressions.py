@@ -114,7 +114,7 @@ class Muscles:
         self.lower = self._lower_lip()
 
     def pull(self, pulls: Sequence[_Pull]) -> FloatArray:
-        """Everything near each point of the front view moves its way, less further away."""
+        """Pull the vertices near points of the front view, less so further away."""
         parts = []
         for centre, way, radius in pulls:
             distance = np.linalg.norm(self.rest[:, :2] - centre, axis=1) / (radius * self._reach)
@@ -196,7 +196,7 @@ class Muscles:
         return np.asarray(self.build.motion * self._around_lips(radius)[:, None] * np.asarray(way))
 
     def _around_lips(self, radius: float) -> FloatArray:
-        """1 in the middle of the mouth, falling to the corners and away from the lips."""
+        """Weight 1 in the middle of the mouth, falling to the corners and away from the lips."""
         mouth = self.build.mouth
         x = self.rest[:, 0] / (0.62 * mouth.width)
         y = (self.rest[:, 1] - mouth.centre[1]) / (radius * (mouth.upper + mouth.lower))
@@ -219,7 +219,7 @@ class Muscles:
         return np.where(self.head.tissue == Tissue.JAW, 1.0, skin)
 
     def _lower_lip(self) -> FloatArray:
-        """1 below the mouth and 0 above, (V,): a step at the lips, a slope on the cheeks."""
+        """Weight 1 below the mouth, 0 above, (V,): a step at the lips, a slope on the cheeks."""
         mouth, lips = self.build.mouth, self.head.lips
         aside = np.maximum(np.abs(self.rest[:, 0]) - 0.4 * mouth.width, 0)
         slope = 0.25 + 0.7 * aside

@@ -29,7 +29,7 @@ def chosen_grid(
     unlabelled: tuple[int, ...] | None,
     repeats: int,
 ) -> Grid:
-    """The grid of what was asked for; None: the numbers that suit the take.
+    """The grid of the given numbers; None stands for those that suit the take.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def default_unlabelled(problem: Problem) -> int:
 
 
 def default_labels(problem: Problem, unlabelled: int) -> tuple[int, ...]:
-    """10 to 40 labels; of a take with few posed frames a quarter, a half and three quarters.
+    """Numbers of labels, 10 to 40; with few posed frames a quarter, half and three quarters.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ def summarise(outcomes: Iterable[Outcome], protocol: Protocol) -> list[Evaluatio
 
 
 def failures_of(rows: Sequence[EvaluationRow]) -> list[str]:
-    """One line for each reason: who failed, at how many labels, and why."""
+    """Lines on failures, one for each reason: the methods, the numbers of labels, the reason."""
     reasons: dict[tuple[int, str], list[str]] = defaultdict(list)
     for row in rows:
         if row.failure:
@@ -167,6 +167,6 @@ def _rank(row: EvaluationRow) -> tuple[int, int, bool, float, str]:
 
 
 def _mean(values: Iterable[float | None]) -> float | None:
-    """Over the repeats in which there was something to measure."""
+    """Mean over the repeats in which there was something to measure."""
     measured = [value for value in values if value is not None]
     return float(np.mean(measured)) if measured else None

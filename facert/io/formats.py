@@ -185,7 +185,7 @@ def _warn_of_loss(take: Take, path: Path) -> None:
 
 
 def write_rig_file(rig: Rig, path: Path, overwrite: bool = False) -> None:
-    """Write a rig in facert's own format; as `facert.mesh.morphs.Morphs` it goes to others.
+    """Write a rig in facert's own format; see `facert.mesh.morphs.Morphs` for others.
 
     Raises
     ------

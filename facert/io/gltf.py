@@ -135,7 +135,7 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
 
 
 def _buffer(uri: Any, folder: Path, own: bytes | None, number: int) -> bytes:
-    """The bytes of a buffer: the file's own chunk, in the URI, or in a file beside it."""
+    """Bytes of a buffer, from the file's own chunk, the URI, or a file beside it."""
     if uri is None and number == 0 and own is not None:
         return own
     if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:

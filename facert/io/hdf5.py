@@ -232,7 +232,7 @@ def stated_format(path: Path) -> str:
 
 
 def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
-    """A rig where the file states that it is one; else it has to be a take."""
+    """Kind of a file: a rig where it states that it is one, else a take."""
     return "rig" if stated_format(path) == RIG_FORMAT else "take"
 
 

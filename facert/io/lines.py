@@ -83,7 +83,7 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
 
 
 def _separator(header: str) -> str:
-    """Whichever gives a header the most cells; the comma where two give as many."""
+    """The separator that gives a header the most cells; the comma where two give as many."""
     return max(SEPARATORS, key=header.count)
 
 

@@ -112,7 +112,7 @@ def open_archive(path: Path) -> Iterator[Archive]:
 
 
 def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
-    """A rig has a neutral and faces; anything else is a track."""
+    """Kind of an archive: a rig has a neutral and faces, anything else is a track."""
     with open_archive(path) as archive:
         return "rig" if "neutral" in archive and "faces" in archive else "take"
 

@@ -100,7 +100,7 @@ def _parse_header(content: bytes) -> tuple[list[_Element], bool]:
 
 
 def _as_float64(body: bytes) -> bytes:
-    """The numbers of a text file as they would lie in a binary one whose types are all float64."""
+    """Bytes of a text file's numbers as in a binary file whose types are all float64."""
     try:
         return np.array(body.split(), dtype="<f8").tobytes()
     except ValueError as error:

@@ -92,7 +92,7 @@ class Decoder(Protocol):
         ...
 
     def rehearse(self, packet: bytes) -> None:
-        """Decode a packet once more, without consequence, so that code and data are at hand."""
+        """Decode a packet again, without effect, so that code and data are cached."""
         self.decode(packet)
 
 

@@ -51,7 +51,7 @@ class Loaded:
     fps: float | None
 
     def calibrate(self, rest: FloatArray) -> None:
-        """Shift frames by where the actor is at rest, in both streams."""
+        """Calibrate both streams to the actor at rest."""
         self.stream.calibrate(rest)
         self.twin.calibrate(rest)
 
@@ -194,7 +194,7 @@ class LiveModel:
             self._loaded.stream.prepare()
 
     def rehearse(self, frame: Frame) -> Streamed:
-        """Map a frame on the twin, without consequence, so that code and data are at hand."""
+        """Map a frame on the second stream, without effect, so that code and data are cached."""
         return _finite(self._loaded.twin, frame)
 
     def _measure_rate(self, time: float) -> None:
@@ -260,7 +260,7 @@ class LiveModel:
 
 
 def _finite(stream: RetargetStream, frame: Frame) -> Streamed:
-    """The pose of a frame; raises FacertError when there is none that is finite."""
+    """The pose of a frame, checked: raises FacertError when it is not finite."""
     try:
         pose = stream.step(frame.values)
     except (np.linalg.LinAlgError, ArithmeticError) as error:

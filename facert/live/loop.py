@@ -79,7 +79,7 @@ class LiveSession:
         stopped: Callable[[], bool] = lambda: False,
         between: Callable[[], None] = lambda: None,
     ) -> None:
-        """Go on until the source ends, a limit is reached, or `stopped`.
+        """Run until the source ends, a limit is reached, or `stopped` is set.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class LiveSession:
             record.send(frame, pose)
 
     def _rehearse(self) -> None:
-        """Go through the last frame once more, so that all is at hand when the next one comes."""
+        """Process the last frame again, so that code and data are cached for the next one."""
         if self._last is None:
             return
         self._receiver.rehearse()

@@ -86,7 +86,7 @@ class Order:
             self._known.popitem(last=False)
 
     def _moment(self, stamp: float | None, arrived: float) -> float:
-        """Time in the session: by the sender's clock while that goes on as time does."""
+        """Time in the session, by the sender's clock while that keeps pace with real time."""
         if self._arrived == -math.inf:
             return self._set_clock(0.0, stamp)
         elapsed = max(arrived - self._arrived, _LEAST_STEP)

@@ -189,10 +189,10 @@ class TakeReceiver:
         ]
 
     def rehearse(self) -> None:
-        """Nothing is decoded."""
+        """Do nothing: a take needs no decoding."""
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no socket is open."""
 
 
 Receiver = UdpReceiver | TakeReceiver

@@ -30,7 +30,7 @@ class RigidMotion:
         return np.asarray((points - self.translations[:, None]) @ self.rotations)
 
     def after(self, first: RigidMotion) -> RigidMotion:
-        """First another motion, then this one; the other may be a single frame for all."""
+        """Composition: first another motion, then this one; the other may be a single frame."""
         rotations = self.rotations @ first.rotations
         moved = np.einsum(
             "tij,tj->ti", self.rotations, np.broadcast_to(first.translations, (len(self), 3))
@@ -111,7 +111,7 @@ def align(
 
 
 def determined(shape: FloatArray, seen: BoolArray) -> BoolArray:
-    """In which frames the points of a shape (m, 3) that are seen (T, m) fix a rotation, (T,).
+    """Mask of frames whose seen points (T, m) of a shape (m, 3) fix a rotation, (T,).
 
     Three do that are not on a line.
     """

@@ -120,7 +120,7 @@ class BlendMap(Map):
 
 @dataclass(frozen=True, eq=False)
 class BaseMaps:
-    """Three maps learned from the same data: two processes, and the factors begun at them.
+    """Three maps learned from the same data: two processes, and factors started from them.
 
     The search for the factors begins at the mean of what both processes predict: clean captures
     want the one, real markers the other, and their mean serves all.

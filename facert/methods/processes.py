@@ -179,7 +179,7 @@ class ProcessBank:
 
 
 class _Features:
-    """Features of frames, but for those that are always 0, and of the labels."""
+    """Computes the features of frames that are not always 0, and holds the labels'."""
 
     def __init__(self, process: FeatureProcess) -> None:
         self._process = process

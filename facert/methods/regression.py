@@ -121,7 +121,7 @@ class Regression(ABC):
         """The map, and a report of it."""
 
     def _linear_response(self, frames: FloatArray) -> FloatArray:
-        """B, least squares of the map's poses on frames (n, d_x); the ridge is the Gaussian's."""
+        """Matrix B of least squares from frames (n, d_x) to the map's poses, with a ridge."""
         if not self.map_.predicts_std:
             return np.empty((frames.shape[1], 0))
         poses, _ = self.map_(frames)
@@ -144,12 +144,12 @@ class Regression(ABC):
         return X, variance
 
     def on(self, device: str) -> Self:
-        """The method itself: on the CPU it is soon done. See `Method.on`."""
+        """Return the method itself, which computes on the CPU alone. See `Method.on`."""
         self._stay_on_cpu(device, "maps")
         return self
 
     def _stay_on_cpu(self, device: str, does: str) -> None:
-        """Warn where another device was asked for, which must be there nonetheless."""
+        """Warn that another device than the CPU is not used; it must exist nonetheless."""
         if device != "cpu" and find_device(device).type != "cpu":  # the second imports torch
             log.warning("%s %s on the CPU: %s is not used", self.settings.method, does, device)
 
@@ -209,7 +209,7 @@ class SupervisedRegression(Regression):
 
 
 class _FrameStream:
-    """Maps frames one after the other; none is remembered."""
+    """Maps frames one after the other, each on its own."""
 
     def __init__(self, method: Regression) -> None:
         self._map, self._gaps, self._fill = method.map_, method.gaps_, method.fill

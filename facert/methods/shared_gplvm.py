@@ -236,7 +236,7 @@ class SemiSupervisedSGPLVM:
         return TrainedViews.at(*small.posteriors())
 
     def _likelihood(self, X: FloatArray, Y: FloatArray, labelled: int) -> ChosenLikelihood:
-        """The setting; where it is ``"auto"``, exact while there is no more than a core."""
+        """The likelihood that is set; ``"auto"`` is exact while the data is no more than a core."""
         if self.settings.likelihood != "auto":
             return self.settings.likelihood
         return "exact" if Core.of(X, Y, labelled).is_all_of(X, Y) else "vfe"

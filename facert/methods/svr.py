@@ -57,7 +57,7 @@ CHOICES = [_Choice(*c) for c in product(range(len(INVERSE_WIDTHS)), PENALTIES, T
 
 
 class _Machine(NamedTuple):
-    """Weights of the training rows, (n,), and what is added."""
+    """Weights of the training rows, (n,), and the offset."""
 
     duals: FloatArray
     offset: float

@@ -61,7 +61,7 @@ class Kernel(ABC):
 
     @abstractmethod
     def relative_curvature(self, squared: Array) -> Array | float:
-        """k''/k in the same manner."""
+        """k''/k; a float where it is the same everywhere."""
 
     @classmethod
     def from_log(cls, log_kernel: FloatArray, noise_floor: float) -> Self:
@@ -185,13 +185,13 @@ def kernel_class(name: str, field: str) -> type[Kernel]:
 
 
 def initial_log_kernel() -> FloatArray:
-    """Log parameters that give the paper's initial {1, 1, 100}, with the floor beside it."""
+    """Log parameters (3,) of the paper's initial {1, 1, 100}, the noise above the floor."""
     theta1, theta2, theta3 = INITIAL_THETA
     return np.log([theta1, theta2, 1.0 / theta3])
 
 
 def _exp(x: Array) -> Array:
-    """The exponential, in place."""
+    """The exponential, computed in place."""
     if isinstance(x, np.ndarray):
         np.exp(x, out=x)
     else:

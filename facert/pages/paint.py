@@ -57,7 +57,7 @@ class Scale:
     """Units of length."""
 
     def paint(self, values: FloatArray, faces: IntArray) -> Paint:
-        """Colours of triangles (F, 3) whose vertices are so far off, (V,)."""
+        """Colours of triangles (F, 3) by the distances at their vertices, (V,)."""
         mean = values[faces].mean(axis=1) / self.top
         return Paint(heat(), np.clip(LEVELS * mean, 0, LEVELS - 1).astype(np.int64))
 

@@ -94,7 +94,7 @@ class PoseEditor:
         self.begin(self._start, self._start_std)
 
     def learn(self, known: KnownPoses | None) -> None:
-        """Learn from other known poses."""
+        """Replace the known poses that completions are learned from."""
         self.known = known
         self._completion.cache_clear()
         self._posed = self._solve(0, 0)

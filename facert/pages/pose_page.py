@@ -69,7 +69,7 @@ class PosePage(PlayedPage):
         self.suggest()
 
     def stop(self) -> None:
-        """End what is under way."""
+        """Stop the workers."""
         self.slow.stop()
         super().stop()
 
@@ -86,7 +86,7 @@ class PosePage(PlayedPage):
         self.worker.do("save", self._save)
 
     def train(self) -> None:
-        """Learn from all labels, and show what comes of it."""
+        """Train on all labels, and show the result."""
         self._train_button.disabled, self._train_button.label = True, TRAINING
         self.slow.do("train", self._train)
 
@@ -154,7 +154,7 @@ class PosePage(PlayedPage):
         self.suggest()
 
     def _train(self) -> None:
-        """Train, in the slow worker, and hand the outcome to the other."""
+        """Train in the slow worker, and show the outcome from the other."""
         try:
             trained = self.session.train()
         finally:

@@ -34,7 +34,7 @@ class Trained:
 
 
 class PosingSession:
-    """Posing a take, frame by frame.
+    """A session of posing a take, frame by frame.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _TURNED = 1e-3  # of the line across the view: less is not worth a message
 
 
 class Part:
-    """Something on the stage, about 1 large.
+    """An object on the stage, scaled to about 1.
 
     Parameters
     ----------

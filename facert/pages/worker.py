@@ -151,7 +151,7 @@ class PlayedPage(ABC):
         self.worker = Worker(show_errors(self._server), self._tick)
 
     def stop(self) -> None:
-        """End what is under way."""
+        """Stop the worker."""
         self.worker.stop()
 
     def seek(self, frame: int) -> None:

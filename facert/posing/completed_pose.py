@@ -53,7 +53,7 @@ class CompletedPose:
 
     @property
     def as_dict(self) -> dict[str, Any]:
-        """Everything by name, as plain values."""
+        """The fields by name, as plain values."""
         return {
             "given": dict(self.given),
             "held": list(self.held),

@@ -115,7 +115,7 @@ class Completion:
         return float(self.regression.distances(values[None]).min())
 
     def _likely(self, given: Given) -> tuple[FloatArray, FloatArray]:
-        """ĝ (k,), and the rows of a root of k V, (k, k); for hard values there are none."""
+        """Likely values ĝ (k,), and a root of k V, (k, k), without rows for hard values."""
         values = given.values
         if given.soft == 0.0:
             return values, np.zeros((0, len(values)))
@@ -129,14 +129,14 @@ class Completion:
         return np.clip(likely, *self.known.bounds[self.given].T), roots
 
     def _nearby(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """P(i) for each of the values (B, k), (B, n); and √(1 + 2 min d), (B, 1)."""
+        """Weights P(i) of known poses for values (B, k), (B, n); and √(1 + 2 min d), (B, 1)."""
         distances = self.regression.distances(values)
         w = np.exp(-NEAR * distances) + ANYWHERE / distances.shape[1]
         widening = np.sqrt(1.0 + 2.0 * distances.min(axis=1, keepdims=True))
         return w / w.sum(axis=1, keepdims=True), widening
 
     def _whole(self, values: FloatArray, rest: FloatArray) -> FloatArray:
-        """Poses (B, P) with these values (B, k) and the rest (B, r), clipped."""
+        """Poses (B, P) of given values (B, k) and the other controls (B, r), clipped."""
         return self._joined(values, np.clip(rest, *self.known.bounds[self.rest].T))
 
     def _joined(self, given: FloatArray | float, rest: FloatArray) -> FloatArray:

@@ -92,7 +92,7 @@ class MedoidProblem:
 
 
 def _two_nearest(near: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The column of the least value in each row, that value, and the next one."""
+    """Column of the least value in each row, that value, and the second least."""
     order = np.argpartition(near, 1, axis=1)[:, :2]
     pair = np.take_along_axis(near, order, axis=1)
     swapped = pair[:, 0] > pair[:, 1]

@@ -79,7 +79,7 @@ def _kernel(distances: FloatArray, products: FloatArray) -> FloatArray:
 
 
 def _scale(given: FloatArray) -> FloatArray:
-    """Half-way between each control's own deviation and the largest one.
+    """Scale of each control: half-way between its own deviation and the largest one.
 
     A control that moves little is often given with less care, but it is given for a reason. One
     that never moves predicts nothing: its scale is infinite.

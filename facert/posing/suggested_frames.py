@@ -158,7 +158,7 @@ def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> Float
 
 
 def _near(time: FloatArray, other: FloatArray, apart: float) -> BoolArray:
-    """Which frames are less than so many seconds apart, (n, m)."""
+    """Mask of pairs of frames less than so many seconds apart, (n, m)."""
     return np.asarray(np.abs(time[:, None] - other) < apart)
 
 

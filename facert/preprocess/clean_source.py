@@ -69,7 +69,7 @@ class CleanSource:
 
     @property
     def filled(self) -> FloatArray:
-        """The measured frames with their gaps filled, noise and all, (T, d_x)."""
+        """The measured frames with their gaps filled and their noise kept, (T, d_x)."""
         return np.where(np.isnan(self.measured), self.clean, self.measured)
 
 

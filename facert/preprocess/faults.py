@@ -76,7 +76,7 @@ class Faults:
         return ", ".join(f"{count} {kind}" for count, kind in counts if count) or "none"
 
     def hidden_from(self, source: Source) -> Source:
-        """The source without them: NaN.
+        """The source with its bad markers set to NaN.
 
         Raises
         ------
@@ -126,7 +126,7 @@ def without_faults(take: Take) -> Take:
 
 
 def held_values(markers: FloatArray) -> BoolArray:
-    """Repeats of a position that chance does not explain, (T, M).
+    """Mask of markers held at a repeated position beyond chance, (T, M).
 
     The chance of a repeat is the share of the other markers that repeat in the same frame (all do
     in a doubled frame), or the share of repeats after frames in which this marker moved, if that
@@ -170,7 +170,7 @@ def _released_far(steps: FloatArray) -> BoolArray:
 
 
 def exchanged(markers: FloatArray) -> BoolArray:
-    """Markers that stand in each other's place for some frames, (T, M).
+    """Mask of markers that stand in each other's place for some frames, (T, M).
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def exchanged(markers: FloatArray) -> BoolArray:
 
 
 def single_spikes(markers: FloatArray) -> BoolArray:
-    """Positions that neither the frames around nor the markers around predict, (T, M).
+    """Mask of positions that neither frames nor markers around them predict, (T, M).
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _crossings(markers: FloatArray) -> list[tuple[int, int, IntArray]]:
 
 
 def _nearest(now: FloatArray, before: FloatArray) -> IntArray:
-    """The marker that was last seen nearest to each marker in each frame, (T, M)."""
+    """Index of the marker last seen nearest to each marker in each frame, (T, M)."""
     result = np.empty(now.shape[:2], dtype=np.int64)
     some = max(DISTANCES_AT_ONCE // now.shape[1] ** 2, 1)
     for start in range(0, len(now), some):
@@ -267,7 +267,7 @@ def _last_seen(markers: FloatArray) -> FloatArray:
 
 
 def _fitted(X: FloatArray) -> Gaussian:
-    """The distribution of frames; some, evenly spread, unless a column would be lost."""
+    """Fit a Gaussian to some frames, evenly spread, or to all if a column would be lost."""
     some = X[np.linspace(0, len(X) - 1, min(FIT, len(X))).round().astype(np.int64)]
     return Gaussian.of(X if np.isnan(some).all(axis=0).any() else some)
 
@@ -293,7 +293,7 @@ def _off_in_time(markers: FloatArray) -> FloatArray:
 
 
 def _continued(x: FloatArray) -> FloatArray:
-    """The frames with two more at each end, on straight lines with the first and the last."""
+    """Frames extended by two at each end, along straight lines."""
     start = [4.0 * x[1] - 3.0 * x[2], 3.0 * x[1] - 2.0 * x[2]]
     end = [3.0 * x[-2] - 2.0 * x[-3], 4.0 * x[-2] - 3.0 * x[-3]]
     return np.concatenate([np.stack(start), x, np.stack(end)])

@@ -224,7 +224,7 @@ def _rigid(
 
 
 def _pose(motion: RigidMotion, known: BoolArray, reference: int | Literal["mean"]) -> RigidMotion:
-    """The one pose that all frames are brought to."""
+    """Head pose that all frames are brought to."""
     if reference == "mean":
         return mean_motion(RigidMotion(motion.rotations[known], motion.translations[known]))
     if not 0 <= reference < len(motion) or not known[reference]:

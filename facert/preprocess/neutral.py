@@ -26,7 +26,7 @@ FULL = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A map of frames to what they would have been in the recording that was learned from."""
+    """A map of frames to the training recording, by the actor at rest in both."""
 
     # (d,): The actor at rest, where a weight's motion begins; infinite where it is only moved
     turn: FloatArray

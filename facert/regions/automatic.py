@@ -152,7 +152,7 @@ def label_errors(frames: FloatArray, labelled: FloatArray, poses: FloatArray) ->
 
 
 def sides_by_name(names: Sequence[str]) -> FloatArray:
-    """1 for brows and eyes, -1 for mouth and jaw, 0 between; NaN where a name has no side."""
+    """Side of each name: 1 for brows and eyes, -1 for mouth and jaw, 0 between, else NaN."""
     sides = np.full(len(names), np.nan)
     for group, members in control_groups(names).items():
         sides[members] = SIDES.get(group, np.nan)

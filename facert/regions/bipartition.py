@@ -49,7 +49,7 @@ def two_groups(frames: FloatArray) -> BoolArray:
 
 
 def together(frames: FloatArray) -> FloatArray:
-    """The RV coefficient of each two things, 0 to 1: how far they move together.
+    """RV coefficients of all pairs, 0 to 1: how far they move together.
 
     Parameters
     ----------

@@ -276,7 +276,7 @@ def untrained_method(settings: Settings, layout: RegionLayout | None = None) -> 
 
 
 def _of_region(face: Normalisation, columns: IntArray, old: float, new: float) -> Normalisation:
-    """A region's units in its old ones, from the face's in its old ones."""
+    """Convert the face's units, relative to its old ones, to those of a region."""
     return Normalisation(face.mean[columns] / old, face.scale * new / old)
 
 
@@ -295,7 +295,7 @@ class _RegionalStream:
 
 
 def _together(names: Sequence[str], regions: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Figures that all regions have in common once, the rest under the names of the regions."""
+    """Join the regions' figures: shared ones once, the rest under the regions' names."""
     first, *others = regions
     common = {
         name: value for name, value in first.items() if all(o.get(name) == value for o in others)

@@ -138,13 +138,13 @@ def _span(slopes: _Pair, starts: _Pair) -> _Pair:
 
 
 def _counted(lengths: IntArray) -> IntArray:
-    """0, 1, ... up to each length, one after the other."""
+    """Counts 0, 1, ... up to each length, one after the other."""
     ends = np.cumsum(lengths)
     return np.asarray(np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - lengths, lengths))
 
 
 def _nearest(hits: _Hits, depth: FloatArray, size: int) -> tuple[_Hits, FloatArray]:
-    """One hit a pixel, the nearest to the viewer, in the order of the image."""
+    """Nearest hit of each pixel to the viewer, in the order of the image."""
     front = np.full(size * size, -np.inf)
     np.maximum.at(front, hits.pixel, depth)
     shown = np.full(size * size, -1)

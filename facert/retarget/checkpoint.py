@@ -162,12 +162,12 @@ class Monitors(Monitor):
         return next((progress for progress in found if progress), None)
 
     def iteration(self, state: State) -> None:
-        """Pass it on to every part."""
+        """Notify every part."""
         for part in self.parts:
             part.iteration(state)
 
     def checkpoint(self, progress: Progress) -> None:
-        """Pass it on to every part."""
+        """Notify every part."""
         for part in self.parts:
             part.checkpoint(progress)
 

@@ -126,7 +126,7 @@ def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of what computed a result, for its metadata."""
+    """Versions of the libraries that computed a result, for its metadata."""
     return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
 
 
@@ -162,7 +162,7 @@ def _check_fit(
 
 
 def _check_rows(rows: FloatArray | None, columns: int, field: str) -> None:
-    """A file of an earlier version has none."""
+    """Check the columns of optional rows: a file of an earlier version has none."""
     if rows is not None and (rows.ndim != 2 or rows.shape[1] != columns):
         raise _misfit(field, f"{columns} columns", f"shape {rows.shape}")
 

@@ -40,7 +40,7 @@ class Streamed:
         self._source = np.zeros(0)
 
     def complete(self) -> Streamed:
-        """Work out all, and let go of what that takes; itself."""
+        """Compute everything that is pending, and return the frame itself."""
         if self._details is not None:
             self._std, self._source = self._details()
             self._details = None
@@ -110,7 +110,7 @@ class RetargetStream:
             self.calibrate(rest)
 
     def calibrate(self, rest: FloatArray) -> None:
-        """Make up, from the next frame on, for where the actor is at rest.
+        """Calibrate to the actor at rest, from the next frame on.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class RetargetStream:
             self._filter.set_noise(self._noise)
 
     def prepare(self) -> None:
-        """Compute all that need not wait for the next frame; else `step` does it."""
+        """Compute in advance all that need not wait for the next frame; else `step` does it."""
         if self._filter is None:
             return
         if self._meter is not None and self._pending is not None:

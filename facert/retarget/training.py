@@ -99,7 +99,7 @@ def check_poses(take: Take) -> None:
 
 
 def _start(start: Retargeter, data: TrainingData) -> StartingModel:
-    """A trained model to begin at, and what keeps it from being one for this take."""
+    """A trained model to begin at, and what makes it unfit for this take, if anything."""
     forms = {
         "kind of source": (data.layout.kind, start.layout.kind),
         "unit of markers": (data.prepared.take.units, start.units),

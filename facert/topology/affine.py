@@ -31,7 +31,7 @@ def scaled_source(take: KeyedPerformance) -> FloatArray:
 
 
 def scaled_points(take: KeyedPerformance) -> FloatArray:
-    """The source, each feature point times the ratio of its own motion over the keys, (T, M, 3)."""
+    """The source scaled point by point by the ratio of the motions over the keys, (T, M, 3)."""
     source, target = _centred_keys(take)
     motion = np.sum(source**2, axis=(0, 2))
     product = np.sum(source * target, axis=(0, 2))

@@ -136,7 +136,7 @@ class FaceDriver:
         self._interpolant = self._solve(faces)
 
     def _held_by_labels(self, rings: Neighbourhoods, loose: LooseParts) -> BoolArray:
-        """Which vertices are in parts with labels, (V,); the others are carried, if they may."""
+        """Mask of vertices in parts with labels, (V,); the others are carried, if allowed."""
         if loose == "refuse":
             require_enough_labels(rings, self.labelled)
         lacking = lacking_components(rings, self.labelled)

@@ -54,7 +54,7 @@ def lacking_components(
 def require_enough_labels(
     neighbourhoods: Neighbourhoods, labelled: IntArray, needed: int = 1
 ) -> None:
-    """Refuse to solve for what no label holds.
+    """Refuse components that have too few labels to be solved for.
 
     Raises
     ------

@@ -50,7 +50,7 @@ def local_ridge(take: KeyedPerformance) -> FloatArray:
 
 
 def _nearness(rest: FloatArray) -> FloatArray:
-    """w_pq between feature points at rest (M, 3), (M, M)."""
+    """Weights w_pq between feature points at rest (M, 3), (M, M)."""
     radius = np.sqrt(np.mean(np.sum((rest - rest.mean(axis=0)) ** 2, axis=1)))
     distance = cdist(rest, rest) / (radius or 1.0)
     return np.asarray(np.exp(-distance / REACH) + EVERYWHERE)
@@ -79,7 +79,7 @@ def _kernel_ridge(take: KeyedPerformance, first: FloatArray, weights: FloatArray
 
 
 def _trusted_path(take: KeyedPerformance, linear: FloatArray, targets: FloatArray) -> FloatArray:
-    """τ k of all frames with the keys, (T, K)."""
+    """The path's kernel τ k of all frames with the keys, (T, K)."""
     path = SmoothPath(len(take), take.keys)
     motion = float(np.sum((take.labels - take.labels.mean(axis=0)) ** 2))
     _, errors = _dual_weights(linear, targets)
@@ -88,10 +88,10 @@ def _trusted_path(take: KeyedPerformance, linear: FloatArray, targets: FloatArra
 
 
 class _Kernels:
-    """k_p between frames and the keys, without a mean over the keys, for every κ."""
+    """Kernels k_p between frames and keys, with no mean over the keys, for every κ."""
 
     def __init__(self, keys: FloatArray, weights: FloatArray) -> None:
-        """From the keys' source (K, M, 3), less its mean, and w_pq (G, M)."""
+        """Prepare the kernels of the keys' source (K, M, 3), less its mean, with w_pq (G, M)."""
         self.keys, self._weights = keys, weights
         self._own = self._powers(keys)
         size = self._own.mean(axis=1)
@@ -111,7 +111,7 @@ class _Kernels:
         return [sure + curvature * bell for curvature in CURVATURES]
 
     def _linear(self, frames: FloatArray) -> FloatArray:
-        """l_p, (G, n, K)."""
+        """Linear kernels l_p of frames and keys, (G, n, K)."""
         products = np.einsum("tqc,kqc->qtk", frames, self.keys)
         return np.asarray(np.tensordot(self._weights, products, axes=1))
 
@@ -122,7 +122,7 @@ class _Kernels:
         return np.asarray(bell - bell.mean(axis=2, keepdims=True))
 
     def _powers(self, frames: FloatArray) -> FloatArray:
-        """l_p(t, t), (G, n)."""
+        """Linear kernels l_p(t, t) of frames with themselves, (G, n)."""
         return np.asarray(self._weights @ np.einsum("tqc,tqc->qt", frames, frames))
 
 

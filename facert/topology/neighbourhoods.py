@@ -48,7 +48,7 @@ class Neighbourhoods:
 
 
 def temporal_windows(frames: int, width: int) -> Neighbourhoods:
-    """The `width` frames around each frame; at both ends, those of them that there are (Figure 2).
+    """Neighbourhoods of the `width` frames around each, fewer at both ends (Figure 2).
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def temporal_windows(frames: int, width: int) -> Neighbourhoods:
 
 
 def mesh_rings(faces: IntArray, vertices: int) -> Neighbourhoods:
-    """Each vertex and those that an edge leads to (Figure 4).
+    """Neighbourhoods of each vertex with its neighbours along edges (Figure 4).
 
     Any triangles will do: edges of three faces, doubled and degenerate faces do no harm. A vertex
     that no face uses is alone.
@@ -88,7 +88,7 @@ def mesh_rings(faces: IntArray, vertices: int) -> Neighbourhoods:
 
 
 def adjacency(faces: IntArray, vertices: int) -> sparse.csr_array:
-    """1 where an edge joins two vertices, (V, V).
+    """Adjacency matrix: 1 where an edge joins two vertices, (V, V).
 
     Raises
     ------

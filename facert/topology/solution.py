@@ -85,7 +85,7 @@ class Elimination:
         return response
 
     def _solved(self, right: FloatArray) -> FloatArray:
-        """B₂₂⁻¹ times a matrix, of the free points."""
+        """Solve B₂₂⁻¹ times a matrix, at the free points."""
         if self._lu is None:
             return right
         with one_thread():

@@ -96,7 +96,7 @@ def rim_vertices(faces: IntArray) -> IntArray:
 
 
 def _hardest(rig: Rig, given: IntArray, count: int) -> IntArray:
-    """The given vertices, then those that are missed most, predicted from all before, (count,)."""
+    """The given vertices, then each time that of largest error given those before, (count,)."""
     predicted = _PredictedShapes(rig, given)
     mirror, everywhere = mirror_vertices(rig.neutral), np.arange(len(rig.neutral))
     chosen = list(given)
@@ -134,7 +134,7 @@ class _PredictedShapes:
 
 
 def _evened(shapes: FloatArray) -> FloatArray:
-    """Shapes as columns (V, 3 P), large ones made smaller."""
+    """Shapes as columns (V, 3 P), their sizes evened: large ones made smaller."""
     size = np.sqrt(np.mean(np.sum(shapes**2, axis=2), axis=1))
     moving = size > 0
     if not moving.any():

@@ -74,7 +74,7 @@ def _clean(
     target: str | None,
     overwrite: bool,
 ) -> None:
-    """Clean one take and report what changed."""
+    """Clean one take and print what changed."""
     from facert.retarget.options import RetargetOptions
 
     take = read_observed(source, target, no_detect)

@@ -125,8 +125,8 @@ def command(
             stack.enter_context(mapper)
         session = LiveSession(receiver, mapper, senders, files, kept)
         stopped = stack.enter_context(interruptible()).is_set
-        stack.enter_context(_settled())
-        stack.enter_context(_first())
+        stack.enter_context(_loaded_exempt_from_gc())
+        stack.enter_context(_raised_priority())
         status = stack.enter_context(Status(session))
         _announce(begin, listen, receiver, ends)
         if neutral is not None:
@@ -204,8 +204,8 @@ def _announce_rest(seconds: float, retargeter: Retargeter) -> None:
 
 
 @contextmanager
-def _first() -> Iterator[None]:
-    """Let this thread go before other programs, where the system allows it.
+def _raised_priority() -> Iterator[None]:
+    """Raise this thread's priority over other programs, where the system allows it.
 
     A packet that is sent wakes its receiver, which would else go first until the next one is sent.
     """
@@ -222,8 +222,8 @@ def _first() -> Iterator[None]:
 
 
 @contextmanager
-def _settled() -> Iterator[None]:
-    """Keep the garbage collector off what was loaded: a look at all of it takes milliseconds."""
+def _loaded_exempt_from_gc() -> Iterator[None]:
+    """Exempt what was loaded from garbage collection: a pass over it takes milliseconds."""
     gc.collect()
     gc.freeze()
     try:

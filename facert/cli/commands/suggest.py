@@ -95,7 +95,7 @@ def command(
 
 
 def _read(path: Path, target: str | None, have: str, model: Retargeter | None) -> Take:
-    """The take; of several targets the one that is gone on from, else none."""
+    """Read the take; of several targets the one that the suggestion continues, else none."""
     from facert.io.formats import read_source_file, read_take_file
 
     if have == LABELS:
@@ -104,7 +104,7 @@ def _read(path: Path, target: str | None, have: str, model: Retargeter | None) -
 
 
 def _posed(take: Take, have: str) -> Sequence[int] | IntArray:
-    """The frames that the suggestion goes on from."""
+    """Posed frames that the suggestion continues."""
     if have != LABELS:
         return ()
     if not len(take.labels):

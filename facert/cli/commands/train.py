@@ -149,7 +149,7 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
 
 
 def _regions(given: str | None) -> Regions | str | None:
-    """Regions of the option: the word auto, or those of a file."""
+    """Regions given by the option: the word auto, or those of a file."""
     from facert.data.regions import AUTO
     from facert.io.toml import read_regions
 
@@ -224,7 +224,7 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
 
 
 def _shown(value: float) -> str:
-    """Three decimals, or three digits where decimals would show little of a number."""
+    """Text of a number: three decimals, or three digits where it is small."""
     if not math.isfinite(value):
         return "-"
     if value and abs(value) < SMALL:

@@ -127,13 +127,13 @@ class _SecondPathExistsError(OutputExistsError):
 
 
 def _begin(level: int) -> None:
-    """Let a process of its own log as much as the first one."""
+    """Set a worker process to log as much as the first one."""
     console.configure(quiet=False, verbose=False)
     console.log.setLevel(level)
 
 
 def _attempt(work: Work, source: Path, output: Path) -> tuple[Path, str | None]:
-    """The source with what went wrong, in one line; None when nothing did."""
+    """Do the work on one file; return it with its error in one line, or with None."""
     try:
         work(source, output)
     except FacertError as error:

@@ -14,7 +14,7 @@ log = logging.getLogger("facert")
 
 
 class _StderrHandler(logging.Handler):
-    """One line a record; Rich's own handler would cut long lines at 80 columns."""
+    """Log handler with one line a record; Rich's own would cut long lines at 80 columns."""
 
     def emit(self, record: logging.LogRecord) -> None:
         warning = record.levelno >= logging.WARNING

@@ -39,7 +39,7 @@ class Command(TyperCommand):
 
 
 class Group(TyperGroup):
-    """Commands in panels."""
+    """Group of commands, listed in panels."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  as the parent has it
         """Print the help as wide as the terminal."""

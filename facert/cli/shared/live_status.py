@@ -69,7 +69,7 @@ class Status:
 
 
 def print_summary(session: LiveSession, written: Sequence[Path], as_json: bool) -> None:
-    """Print what happened, on stdout."""
+    """Print the summary of a session on stdout."""
     pace = session.meter.pace()
     if as_json:
         typer.echo(json.dumps(_facts(session.counters, pace, written), indent=2))
@@ -110,5 +110,5 @@ def _facts(counters: Counters, pace: Pace, written: Sequence[Path]) -> dict[str,
 
 
 def _plain(value: float) -> float | None:
-    """JSON has no NaN."""
+    """The value, or None for NaN and infinity, which JSON does not have."""
     return value if math.isfinite(value) else None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Files:
-    """What the user named, as in the options of ``facert pose``."""
+    """Files and names given to ``facert pose``."""
 
     rig: Path | None
     take: Path | None
@@ -84,7 +84,7 @@ def _require_output(output: Path, overwrite: bool) -> None:
 
 
 def _model(files: Files) -> Retargeter | None:
-    """The model that was named; one that lies about may be of another character."""
+    """The model that was named, never one found by chance: it may be of another character."""
     import facert
 
     if files.model is None and DEFAULT_MODEL.exists():

@@ -24,7 +24,7 @@ Thing = TypeVar("Thing")
 
 
 def watched(things: Iterable[Thing], total: int, noun: str) -> Iterator[Thing]:
-    """Things as they come: with a bar on a terminal, elsewhere with a note for every tenth."""
+    """Iterate and show progress: a bar on a terminal, elsewhere a note for every tenth."""
     notes, terminal = console.log.isEnabledFor(logging.INFO), console.err.is_terminal
     columns = (BarColumn(), MofNCompleteColumn(), noun, TimeRemainingColumn())
     hidden = not (terminal and notes)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # importing it takes seconds: not for those that stay on the 
 
 
 def namespace(array: FloatArray) -> Any:
-    """NumPy, or torch for a tensor."""
+    """The module of an array's functions: NumPy, or torch for a tensor."""
     return np if isinstance(array, np.ndarray) else sys.modules["torch"]
 
 

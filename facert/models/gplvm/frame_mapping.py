@@ -38,7 +38,7 @@ MOST_STEPS = 12
 
 
 class _DataTerm(NamedTuple):
-    """F of a frame, and its weighted residual."""
+    """The data term of F for a frame, and its weighted residual."""
 
     energy: float
     w: FloatArray

@@ -48,7 +48,7 @@ CHUNK, DEVICE_CHUNK = 128, 4096
 
 
 def chunks_of(frames: int, view: Predictor) -> Iterator[slice]:
-    """Slices of so many frames that are computed together."""
+    """Slices of frames that are computed together."""
     size = CHUNK if view.device is None else DEVICE_CHUNK
     return (slice(first, first + size) for first in range(0, frames, size))
 
@@ -154,7 +154,7 @@ class SourceMapping:
         return self.view.here(self.view.Z[self._train_energies(b, R).argmin(1)])
 
     def _train_energies(self, b: FloatArray, R: FloatArray) -> FloatArray:
-        """About F at the training latents, (B, N)."""
+        """Approximate F at the training latents, (B, N)."""
         xp = namespace(b)
         w = 1.0 / (self._train_variance + R)
         wb = w * b
@@ -289,7 +289,7 @@ class SourceMapping:
 def _leave_saddles(
     hessian: FloatArray, step: FloatArray, descent: FloatArray, done: BoolArray
 ) -> BoolArray:
-    """Which of the frames that are done stand on a saddle; their steps are set to lead off it."""
+    """Mask of converged frames at a saddle point; their steps are set to lead off it."""
     try:
         np.linalg.cholesky(hessian[done])
         return np.zeros(np.count_nonzero(done), dtype=bool)

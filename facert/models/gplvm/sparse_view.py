@@ -86,7 +86,7 @@ class SparseView(GaussianView):
 
 
 def row_weights(rows: int, labelled: int) -> Tensor:
-    """Weights: 1 for labelled rows, and for the others so much that `MOST_COUNTED` is their sum."""
+    """Weights of rows: 1 for labelled ones; those of the others sum to `MOST_COUNTED` at most."""
     weights = torch.ones(rows, dtype=torch.float64)
     weights[labelled:] = min(1.0, MOST_COUNTED / max(rows - labelled, 1))
     return weights

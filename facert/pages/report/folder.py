@@ -49,7 +49,7 @@ def file_section(path: Path, rig: Rig | None = None, truth: Take | None = None) 
 def folder_sections(
     folder: Path, rig: Rig | None = None, truth: Take | None = None
 ) -> tuple[Section, ...]:
-    """Sections of all that lies in a folder; what is none of it is passed over.
+    """Sections of all results in a folder; other files are passed over.
 
     Retargeted takes are shown with the first rig in the folder that has their controls, and
     beside the take that is posed throughout, has the same frames, and shares most controls. A

@@ -52,7 +52,7 @@ Seen = BoolArray | None
 
 
 class MotionFilter:
-    """Cleans one frame after the other.
+    """Filter that cleans one frame after the other.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class MotionFilter:
     def step(self, frame: FloatArray, seen: Seen = None) -> FloatArray:
         """The mean (d,) of one more normalised frame (d,), where `seen`."""
         self.look_ahead()
-        seen = self._believed(frame, seen)
+        seen = self._accepted(frame, seen)
         mean = self._shared.step(frame, seen)
         rest = self._rest.step(frame - mean, seen)
         self._begun, self._looked = True, False
@@ -97,8 +97,8 @@ class MotionFilter:
         """Variance of the latest mean, (d,)."""
         return self._shared.variance + self._rest.variance
 
-    def _believed(self, frame: FloatArray, seen: Seen) -> Seen:
-        """The columns seen, without those far off for the first time; then they count."""
+    def _accepted(self, frame: FloatArray, seen: Seen) -> Seen:
+        """Columns seen that are accepted: a far-off value counts from its second time on."""
         if not self._begun:
             return seen
         shared, rest = self._shared, self._rest
@@ -176,7 +176,7 @@ class _FactorFilter:
         change = np.abs(after.diagonal() - before.diagonal()).max()
         return _Gain(
             seen,
-            gain=update.take @ weighted.T,
+            gain=update.weight @ weighted.T,
             P=after,
             variance=factors.variance(after[None, :q, :q])[0],
             settled=bool(change < SETTLED * after.diagonal().min()),

@@ -128,9 +128,9 @@ def _spread(indices: IntArray, most: int) -> IntArray:
 
 
 def _paced(factors: MotionFactors, X: FloatArray) -> tuple[MotionFactors, FloatArray, FloatArray]:
-    """The factors in units of their deviation, how quickly each moves, and what they leave over.
+    """Factors in units of their deviation, the rate of each, and the residuals.
 
-    The latter of stretches of the take, (length, stretches, d).
+    The residuals are those of stretches of the take, (length, stretches, d).
     """
     length = min(STRETCH, len(X))
     shown = np.lib.stride_tricks.sliding_window_view((~np.isnan(X)).mean(axis=1), length)
@@ -160,7 +160,7 @@ def _squares(found: Smoothed) -> FloatArray:
 
 
 def _rest(left: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Variance and rate of what the factors leave over, from stretches (length, stretches, d).
+    """Variance and rate of the residual of the factors, from stretches (length, stretches, d).
 
     A column that no stretch shows is taken to be like the others.
     """

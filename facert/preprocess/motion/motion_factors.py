@@ -96,7 +96,7 @@ class MotionFactors(ArrayGroup):
 
     @property
     def count(self) -> int:
-        """q, how many there are."""
+        """Number of factors q."""
         return int(self.weights.shape[1])
 
     def with_noise(self, more: float, least: float = 0.0) -> MotionFactors:

@@ -52,13 +52,13 @@ class Smoothed:
 class FactorUpdate(NamedTuple):
     """Covariances of factors and velocities before and after a frame is seen.
 
-    The frame takes the mean m to keep m + take pull.
+    The frame takes the mean m to keep m + weight pull.
     """
 
     before: FloatArray
     after: FloatArray
     keep: FloatArray
-    take: FloatArray
+    weight: FloatArray
 
 
 class SeriesUpdate(NamedTuple):
@@ -94,7 +94,7 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
     before, after = (np.empty((frames, *m.shape)) for _ in range(2))
     for t, update in enumerate(filtered):
         before[t] = m @ F.T if t else m
-        m = _times(update.keep, before[t]) + _times(update.take, pull[t])
+        m = _times(update.keep, before[t]) + _times(update.weight, pull[t])
         after[t] = m
     return _smoothed(filtered, F, before, after)
 
@@ -134,7 +134,7 @@ def _forward(
 
 
 def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
-    """Frames (T, ...) that equal the one before, (T,)."""
+    """Mask of frames (T, ...) that equal the one before, (T,)."""
     same = (frames[1:] == frames[:-1]).all(axis=tuple(range(1, frames.ndim)))
     return np.concatenate([[False], same])
 
@@ -142,12 +142,12 @@ def _repeats(frames: FloatArray | BoolArray) -> BoolArray:
 def factor_update(P: FloatArray, precision: FloatArray) -> FactorUpdate:
     """The update of covariances (..., 2 q, 2 q) by a frame of some precision, (..., q, q)."""
     q = precision.shape[-1]
-    take = P[..., :q] @ np.linalg.inv(np.eye(q) + precision @ P[..., :q, :q])
-    gain = take @ precision
+    weight = P[..., :q] @ np.linalg.inv(np.eye(q) + precision @ P[..., :q, :q])
+    gain = weight @ precision
     keep = np.broadcast_to(np.eye(2 * q), P.shape).copy()
     keep[..., :q] -= gain
     after = P - gain @ P[..., :q, :]
-    return FactorUpdate(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, take)
+    return FactorUpdate(P, (after + np.swapaxes(after, -1, -2)) / 2.0, keep, weight)
 
 
 def _settled(P: FloatArray, last: FloatArray) -> bool:
@@ -158,7 +158,7 @@ def _settled(P: FloatArray, last: FloatArray) -> bool:
 
 
 def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """(..., n, k) times (..., k)."""
+    """Matrices (..., n, k) times vectors (..., k)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
@@ -254,7 +254,7 @@ def _series_smoothed(
 
 
 def _series_gain(after: FloatArray, F: FloatArray, before: FloatArray) -> FloatArray:
-    """P Fᵀ P'⁻¹, (2, 2, d), from covariances (3, d) after a frame and before the next."""
+    """Gain P Fᵀ P'⁻¹, (2, 2, d), of covariances (3, d) after a frame and before the next."""
     p, q, s = before
     inverse = np.array([[s, -q], [-q, p]]) / (p * s - q * q)
     cross = np.einsum("ijd,kjd->ikd", after[[[0, 1], [1, 2]]], F)
