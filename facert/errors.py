@@ -1,4 +1,4 @@
-"""What can go wrong, under one parent.
+"""The errors that facert raises, under one parent.
 
 A message names the file or argument, the field, what was expected, what was found, and the fix.
 Each class carries the exit status that the command line returns for it.

@@ -1,1 +1,1 @@
-"""What facert works on: takes, rigs, their names, units and time; plain checked arrays."""
+"""The data that facert works on: takes, rigs, their names, units and time; plain checked arrays."""

@@ -62,7 +62,7 @@ def resampled(take: Take, fps: float) -> Take:
 def nominal_rate(time: FloatArray) -> float:
     """Frames a second by the usual spacing of the frames; whole where that is within 1 %.
 
-    Of times (T,) that do not rise, or a single frame, `ONE_FRAME`; gaps do not count.
+    `ONE_FRAME` for times (T,) that do not rise, or a single frame; gaps do not count.
     """
     if time.ndim != 1 or len(time) < 2 or not (time[1:] > time[:-1]).all():
         return ONE_FRAME

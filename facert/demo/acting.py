@@ -1,4 +1,4 @@
-"""What the actor does: speech, feelings and blinks as overlapping gestures.
+"""The actor's performance: speech, feelings and blinks as overlapping gestures.
 
 A gesture moves a few activations smoothly away from rest and back. Everything is a sum of
 gestures, so neighbouring sounds blend into each other as they do in speech (coarticulation).

@@ -1,4 +1,4 @@
-"""What the muscles do: one displacement of the whole mesh for each activation.
+"""The effect of the muscles: one displacement of the whole mesh for each activation.
 
 Every field is made from the landmarks of a `Build`, so the same few lines move both heads.
 """

@@ -33,7 +33,7 @@ def call_each(
     ----------
     function : callable
     arguments : sequence of tuple
-        Of each call.
+        Positional arguments of each call.
     jobs : int
         Processes; 1 stays in this one.
     begin : callable, optional

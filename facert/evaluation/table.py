@@ -25,7 +25,7 @@ class EvaluationRow:
     method: str
     labels: int
     unlabelled: int
-    # Of the protocol
+    # Noise and gaps of the protocol
     noise: float
     missing: float
     repeats: int  # How many of them the method could run

@@ -1,4 +1,4 @@
-"""What a person writes in a TOML file: any table; the regions of a face.
+"""TOML files that a person writes: any table; the regions of a face.
 
 [brows-and-eyes]
 markers = ["browLeft", "browRight"]

@@ -37,7 +37,7 @@ class RestWatch:
     Parameters
     ----------
     seconds : float
-        From the session's first frame.
+        Seconds to watch, from the session's first frame on.
     watch : FaultDetector, optional
         Finds the markers that are at fault: a lost one may be written as (0, 0, 0).
     """
@@ -107,9 +107,9 @@ class PlacementWatch(RestWatch):
     Parameters
     ----------
     retargeter : Retargeter
-        Of markers.
+        A retargeter of markers.
     names : sequence of str
-        Of the session's markers, length M.
+        Names of the session's markers, length M.
     """
 
     def __init__(self, retargeter: Retargeter, names: Sequence[str]) -> None:

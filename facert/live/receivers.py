@@ -49,7 +49,7 @@ class UdpReceiver:
     finished : bool
         Whether no more frames can come.
     start_timecode : str
-        Of the first frame, as in Live Link Face's CSV; empty when unknown.
+        Timecode of the first frame, as in Live Link Face's CSV; empty when unknown.
     """
 
     fps: float | None = None

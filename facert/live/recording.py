@@ -1,4 +1,4 @@
-"""What a session received and sent, kept on disk while it runs and written as takes at its end."""
+"""Recordings of what a session receives and sends: on disk while it runs, as takes at its end."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ class Recordings:
     cleaned : tuple of str
         Names of what the model makes of it.
     controls : Controls
-        Of the poses.
+        Controls of the poses.
     overwrite : bool
         Allow to replace existing files.
     """

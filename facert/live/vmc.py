@@ -53,10 +53,10 @@ class OscDecoder(Decoder):
     Parameters
     ----------
     names : sequence of str, length D or M
-        Of the weights or markers that are wanted, found in any spelling; others are passed over.
+        Wanted weights or markers, found in any spelling; others are passed over.
     kind : {"weights", "markers"}
     units : str
-        Of markers: those of the model, as packets do not name any.
+        Unit of markers: the model's, as packets do not name any.
     """
 
     from_midnight = False

@@ -67,7 +67,7 @@ class TrainingReport:
     result: Result | None = None  # Of the optimiser, where the method descends step by step
     # Numbers by their names, e.g. kernel parameters.
     figures: Mapping[str, float] = field(default_factory=dict)
-    # Those that have the unit of normalised poses, e.g. errors.
+    # Figures in the unit of normalised poses, e.g. errors.
     pose_figures: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -63,7 +63,7 @@ class BlendMap(Map):
     whitened: FeatureProcess
     factors: FactorMap
     residual: FeatureProcess  # Predicts the factors' error
-    # Of the factors without and with the residual
+    # Shrinkage of the factors without and with the residual
     shrinkage: Shrinkage
     residual_shrinkage: Shrinkage
 

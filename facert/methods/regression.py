@@ -54,7 +54,7 @@ class Regression(ABC):
     Parameters
     ----------
     settings : Settings
-        Of these the name of the method, the seed and the device are used.
+        Only the name of the method, the seed and the device are used.
     """
 
     map_type: ClassVar[type[Map]]

@@ -139,7 +139,7 @@ class Timeline:
     server : ViserServer
     take : Take
     playback : Playback
-        Of its frames.
+        Playback of the take's frames.
     seek : callable
         Called with the frame that was asked for.
     """

@@ -135,9 +135,9 @@ class PlayedPage(ABC):
     ----------
     server : ViserServer
     time : array, shape (T,)
-        Of the frames.
+        Times of the frames.
     width : int
-        Of the panel at the right, in pixels.
+        Width of the panel at the right, in pixels.
     """
 
     def __init__(self, server: ViserServer, time: FloatArray, width: int) -> None:

@@ -107,7 +107,7 @@ def complete_pose(
         Standard deviation of the values, in the controls' own units: the pose may be so far from
         them. At 0 it meets them exactly.
     samples : int
-        How many other plausible poses to draw.
+        Number of other plausible poses to draw.
     seed : int
         For them.
     start : Take, optional

@@ -91,7 +91,7 @@ class Completion:
         given : Given
             Its controls are those that this was learned for.
         samples : int
-            How many other poses to draw.
+            Number of other poses to draw.
         rng : numpy.random.Generator
         """
         likely, roots = self._likely(given)

@@ -46,12 +46,12 @@ def correct(
     start : array, shape (P,)
         The pose to begin with.
     std : array, shape (P,), or None
-        Its standard deviation.
+        Standard deviation of the pose.
     known : KnownPoses
     given : Given
         The controls that are set.
     samples : int
-        How many other poses to draw.
+        Number of other poses to draw.
     rng : numpy.random.Generator
     held : array of int, shape (h,), optional
         Other controls, which keep the value of `start`.

@@ -1,4 +1,4 @@
-"""From some controls of a pose to the rest: Gaussian process regression with a rough kernel.
+"""Regression from some controls of a pose to the rest: a Gaussian process of rough kernel.
 
 Poses of a performance lie in clusters and on folded sheets: the mouth's corner predicts the cheek,
 but not by a smooth curve. The squared exponential, whose draws are smooth everywhere,

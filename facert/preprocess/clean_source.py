@@ -57,7 +57,7 @@ class CleanSource:
     """A source with the markers or weights of a model, in their order."""
 
     source: Source  # Without bad markers, in the take's units
-    # Of a frame of the take: the actor at rest, where frames were named for it
+    # The actor at rest in the shape of a frame, where frames were named for it
     rest: FloatArray | None
     # (T, d_x): Calibrated frames in normalised units, NaN: not observed, and the same without
     # noise and gaps; the measured ones where nothing was smoothed
@@ -86,9 +86,9 @@ def clean_source(
     ----------
     take : Take
     layout : SourceLayout
-        Of the model.
+        Layout of the model's source.
     units : Normalisation
-        Of its source.
+        Normalisation of the model's source.
     neutral : array, shape (d_x,)
         The actor at rest in the take that it was trained on.
     options : SourceOptions

@@ -338,7 +338,7 @@ class FaultDetector:
     Parameters
     ----------
     markers : int
-        How many there are.
+        Number of markers.
     """
 
     def __init__(self, markers: int) -> None:

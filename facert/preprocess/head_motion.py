@@ -67,7 +67,7 @@ def stabilise(
     Parameters
     ----------
     take : Take
-        Of markers; gaps are allowed.
+        A take of markers; gaps are allowed.
     stable : sequence of str, or "automatic"
         Names of markers that hardly move against the skull, or `stable_markers`.
     reference : int or "mean" or Take

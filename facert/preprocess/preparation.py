@@ -40,7 +40,7 @@ class Prepared:
     take: Take
     measured: Source  # The same with noise and gaps
     units: Normalisation  # Of the measured source
-    # Of noise and motion; None where frames do not follow each other
+    # Estimate of noise and motion; None where frames do not follow each other
     estimate: MotionEstimate | None
 
 
@@ -49,7 +49,7 @@ class TrainingData:
     """Training data of a take, in the take's units, and the units to normalise it by."""
 
     prepared: Prepared
-    # Of the markers or weights that the take was recorded with, seen or not
+    # Names of the markers or weights that the take was recorded with, seen or not
     names: tuple[str, ...]
     layout: SourceLayout  # Of the prepared take
     controls: Controls

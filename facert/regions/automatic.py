@@ -131,7 +131,7 @@ def label_errors(frames: FloatArray, labelled: FloatArray, poses: FloatArray) ->
     frames : array, shape (n, d)
         All frames of some markers, complete, in any unit; the features are learned from them.
     labelled : array, shape (l, d)
-        Those with a pose.
+        Frames with a pose.
     poses : array, shape (l, P)
 
     Returns

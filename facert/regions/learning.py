@@ -38,10 +38,10 @@ class StartingModel:
     """A trained model for a method to begin at."""
 
     method: Method
-    # That it was trained in
+    # Units that it was trained in
     source_units: Normalisation
     target_units: Normalisation
-    # What of its source and target is not that of the take to train on; it is then not used
+    # What in its source or target differs from the take to train on; it is then not used
     difference: str | None
 
 

@@ -128,7 +128,7 @@ class Regional:
     settings : Settings
         With regions, for their names.
     layout : RegionLayout, optional
-        Of the same regions in the same order; `load` finds it in the file.
+        Layout of the same regions in the same order; `load` finds it in the file.
     """
 
     most_unlabelled: ClassVar[int | None] = None
@@ -161,7 +161,7 @@ class Regional:
         Parameters
         ----------
         labelled, unlabelled : Labelled, Unlabelled
-            Of the face, normalised and complete.
+            Data of the whole face, normalised and complete.
         monitor : Monitor, optional
             Not used.
 

@@ -1,1 +1,1 @@
-"""From a take to a trained retargeter, and from a performance to the poses of a character."""
+"""Training of a retargeter on a take, and retargeting of performances to a character."""

@@ -27,13 +27,13 @@ class TrainedModel:
     layout : SourceLayout
         What the source must hold.
     units : str
-        Of the training take's markers; empty when unknown.
+        Unit of the training take's markers; empty when unknown.
     controls : Controls
         What the result holds.
     bounds : array, shape (P, 2), or None
         What poses are clipped to.
     source_units, target_units : Normalisation
-        To normalised units and back.
+        Maps between the units of source and target and normalised ones.
     figures : dict
         How training went, for people.
     labels : int

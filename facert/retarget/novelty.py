@@ -52,7 +52,7 @@ def relative_residuals(
     frames, posed : arrays, shapes (T, d) and (l, d)
         Normalised and complete.
     variance : array, shape (d,)
-        Of each column in the training take.
+        Usual variance of each column in the training take.
     kind : {"markers", "weights"}
     """
     centre = posed.mean(axis=0)

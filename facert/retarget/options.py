@@ -52,7 +52,7 @@ class Adjustments:
             ``{"jawOpen": {"gain": 1.1, "limits": [0.0, 0.9], "smoothing": 0.5}}``; a name may
             have wildcards, ``"eyeBlink*"``. A later table overrides an earlier one.
         names : sequence of str
-            Of the character's controls.
+            Names of the character's controls.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class RetargetOptions(SourceOptions):
     Parameters
     ----------
     adjustments : Adjustments, optional
-        Of single controls.
+        Adjustments of single controls.
     """
 
     adjustments: Adjustments | None = None
@@ -113,7 +113,7 @@ class PoseScale:
     Parameters
     ----------
     units : Normalisation
-        Of the poses.
+        Normalisation of the poses.
     bounds : array, shape (P, 2), or None
         What poses are clipped to.
     adjustments : Adjustments

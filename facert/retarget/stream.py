@@ -64,7 +64,7 @@ class RetargetStream:
     ----------
     model : TrainedModel
     names : sequence of str
-        Of the source's markers or weights.
+        Names of the source's markers or weights.
     fps : float, optional
         Frames a second; by default that of the training take.
     options : RetargetOptions, optional

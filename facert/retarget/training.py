@@ -1,4 +1,4 @@
-"""From a take to a trained retargeter."""
+"""Training of a retargeter on a take."""
 
 from __future__ import annotations
 

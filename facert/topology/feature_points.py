@@ -122,9 +122,9 @@ def mapped_vertices(table: Mapping[str, object], names: Sequence[str]) -> tuple[
     Parameters
     ----------
     table : mapping
-        From the name of a point, in any spelling, to its vertex.
+        Vertex of each point by its name, in any spelling.
     names : sequence of str
-        Of all points; those that the map leaves out are not used.
+        Names of all points; those that the map leaves out are not used.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def nearest_vertices(rest: FloatArray, vertices: FloatArray) -> IntArray:
     Parameters
     ----------
     rest : array, shape (M, 3)
-        In the mesh's space and units.
+        Points at rest, in the mesh's space and units.
     vertices : array, shape (V, 3)
 
     Raises
@@ -182,7 +182,7 @@ def carried_over(points: FloatArray, rest: FloatArray, home: FloatArray, fit: Fi
     rest : array, shape (M, 3)
         The points when the face they come from rests.
     home : array, shape (M, 3)
-        Their vertices on the neutral of the other face.
+        Positions of the points' vertices on the neutral of the other face.
     fit : {"uniform", "axes"}
         Whether s is the ratio of the faces' sizes over all axes, or for each alone.
 

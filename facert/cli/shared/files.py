@@ -1,4 +1,4 @@
-"""What several commands do with files: refuse names in time, read without bad markers, write."""
+"""Work of several commands with files: refuse names in time, read without bad markers, write."""
 
 from __future__ import annotations
 

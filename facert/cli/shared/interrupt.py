@@ -1,4 +1,4 @@
-"""How commands that run until they are asked to end learn of it."""
+"""Interruption of commands that run until they are asked to end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a live session goes: a line on the terminal, or in the log now and then; a summary."""
+"""Status of a live session: a line on the terminal, or in the log now and then; a summary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scripts share: they run inside of other programs, so that this needs no package."""
+"""Functions shared by scripts that run inside of other programs, so that this needs no package."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ def _regress(
     prior : array, shape (d, q)
         W₀.
     rows : int
-        Of the view.
+        Number of rows of the view.
     """
     k = PRIOR_SHARE * rows
     solution = np.linalg.solve(squares + k * np.eye(len(squares)), (products + k * prior).T)

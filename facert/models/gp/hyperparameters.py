@@ -64,7 +64,7 @@ def maximise_likelihood(
     Y : array, shape (n, d)
         Observations, with mean zero.
     linear_bounds : tuple of float
-        Of log λ; `NO_LINEAR_TERM` leaves the squared exponential alone.
+        Bounds of log λ; `NO_LINEAR_TERM` leaves the squared exponential alone.
     """
     profile = _Profile(X, Y)
     bounds = (WIDTH_BOUNDS, NOISE_BOUNDS, linear_bounds)

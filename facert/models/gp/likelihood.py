@@ -66,7 +66,7 @@ def negative_log_likelihood(
     value : Tensor, scalar
         -log P(X|Z).
     dZ, d_log_kernel : Tensor
-        Its gradient; see `facert.models.closed_form` for torch's use.
+        Gradient of the value; see `facert.models.closed_form` for torch's use.
 
     Raises
     ------

@@ -205,7 +205,7 @@ def sparse_negative_log_likelihood(
     value : Tensor, scalar
         With U = Z it is the exact value, but for the jitter.
     dZ, dU, d_log_kernel : Tensor
-        Its gradient.
+        Gradient of the value.
 
     Raises
     ------

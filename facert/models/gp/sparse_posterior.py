@@ -41,9 +41,9 @@ def sparse_posterior(
     kernel : Kernel
         Fixed parameters.
     approximation : {"vfe", "fitc"}
-        With which the parameters were found.
+        The approximation with which the parameters were found.
     weights : array, shape (n,), optional
-        Of the rows, as they were then.
+        Weights of the rows at that time.
     """
     parts = factorise(
         torch.from_numpy(kernel.cross(inducing, inducing)),

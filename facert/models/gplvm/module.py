@@ -85,7 +85,7 @@ class SharedGPLVM(nn.Module):
     Parameters
     ----------
     source, target : GaussianView
-        Of the rows of `facert.models.gplvm.lle.view_rows`.
+        Views of the rows that `facert.models.gplvm.lle.view_rows` gives.
     M : csr_array, shape (constraints, l + m + n), or None
         Reconstruction constraints of the latent prior, Eq. (6). None leaves P(Z) = N(0, I), the
         supervised model of Ek (2009).

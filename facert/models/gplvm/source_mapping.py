@@ -116,7 +116,7 @@ class Mapped:
     hessian: FloatArray
     energy: FloatArray  # (B,): F(z*)
     converged: BoolArray  # (B,): Whether Newton's method met its tolerance
-    # Of a single frame that was followed: where its last step was taken from
+    # Where the last step of a single followed frame was taken from
     linearised: LinearisedView | None = None
 
 

@@ -36,7 +36,7 @@ class SparseView(GaussianView):
     inducing : array, shape (m, q)
         Initial inducing latents, see `inducing_rows`.
     weights : Tensor, shape (n,)
-        Of the rows, see `row_weights`.
+        Weights of the rows, see `row_weights`.
     approximation : {"vfe", "fitc"}
         See `facert.models.gp.sparse`.
     """

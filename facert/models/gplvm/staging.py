@@ -63,7 +63,7 @@ class TrainedViews:
     # Its views
     source: Predictor
     target: Predictor
-    # Of the other model, in the units of the views
+    # Units of the other model, relative to those of the views
     source_units: Normalisation
     target_units: Normalisation
 

@@ -1,4 +1,4 @@
-"""What of a folder goes into a report: evaluations, performances, models."""
+"""The files of a folder that go into a report: evaluations, performances, models."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def fits(rig: Rig, take: Take) -> bool:
 def truth_among(known: Sequence[Take], take: Take) -> Take | None:
     """The take that holds somebody's poses for every frame of another one.
 
-    Of several, the one that shares most of its controls; it is none that shares less than half.
+    Of several, the one that shares most controls is taken, and none that shares less than half.
     """
     best, least = None, None
     for truth in known:

@@ -1,4 +1,4 @@
-"""What a report is made of. All text is plain: `facert.pages.report.page` escapes it."""
+"""Parts of a report. All text is plain: `facert.pages.report.page` escapes it."""
 
 from __future__ import annotations
 

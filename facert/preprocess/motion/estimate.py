@@ -126,7 +126,7 @@ def estimate_if_it_moves(
 def _relation(X: FloatArray) -> float:
     """Variance of the difference between neighbouring frames, relative to that of unrelated ones.
 
-    Of the column where it is least: others may be noise alone.
+    The least of all columns is taken: others may be noise alone.
     """
     steps, variance = np.diff(X, axis=0), np.nanvar(X, axis=0)
     known = (variance > 0.0) & ~np.isnan(steps).all(axis=0)

@@ -194,7 +194,7 @@ class _SeriesFilter:
     def _begin(self) -> None:
         """Return to the prior covariance, at the present values and at rest."""
         self._m = self._m * [[1.0], [0.0]]
-        # Of the latest frame: the covariance before it was seen, and the gain.
+        # Covariance before the latest frame was seen, and its gain.
         self._P, self._gain = self._chain.prior, np.zeros_like(self._m)
         self._P_ahead = self._chain.prior
         self._width = np.ones_like(self._chain.prior[0])

@@ -1,4 +1,4 @@
-"""How a source moves in time, to estimate its frames through noise and gaps.
+"""The motion of a source in time, to estimate its frames through noise and gaps.
 
 Two layers, each smooth in time: the few factors that move the face, estimated over all frames
 together from whatever each shows, and the rest that they leave of every column, which fills in

@@ -199,7 +199,7 @@ def smooth_series(
         Observations, where `seen`.
     seen : array of bool, shape (T, d)
     variance : array, shape (d,)
-        Of each series.
+        Variance of each series.
     noise : float
         Variance of an observation.
     a : array, shape (d,)
