@@ -6,6 +6,7 @@ table in the documentation are made from the fields: another setting is another 
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -148,8 +149,10 @@ class Settings:
         """
         unknown = sorted(changes.keys() - DESCRIBED.keys())
         if unknown:
-            known = ", ".join(sorted(DESCRIBED))
-            raise InputError(unknown[0], f"one of {known}", "an unknown setting", "Remove it.")
+            near = difflib.get_close_matches(unknown[0], DESCRIBED, n=1)
+            expected = "a setting" if near else f"one of {', '.join(sorted(DESCRIBED))}"
+            fix = f"Did you mean {near[0]}?" if near else "Remove it."
+            raise InputError(unknown[0], expected, "an unknown name", fix)
         regions = changes.get("regions")
         if isinstance(regions, Mapping):
             changes = {**changes, "regions": Regions.of(regions)}

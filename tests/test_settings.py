@@ -51,8 +51,10 @@ def test_changes_leave_the_rest_as_it_was():
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():
-    with pytest.raises(InputError, match=r"latent_dims: expected one of .*latent_dim"):
-        Settings().with_changes({"latent_dims": 4})
+    with pytest.raises(InputError, match=r"whiskers: expected one of .*latent_dim"):
+        Settings().with_changes({"whiskers": 4})
+    with pytest.raises(InputError, match=r"metod: .*Did you mean method\?"):
+        Settings().with_changes({"metod": "gpr"})
 
 
 def test_settings_survive_the_way_through_a_dictionary():

@@ -79,7 +79,7 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def options(
-    quiet: Annotated[bool, option("Only warnings and errors.", "--quiet", "-q")] = False,
+    quiet: Annotated[bool, option("Results, warnings and errors only.", "--quiet", "-q")] = False,
     verbose: Annotated[bool, option("Details as well.", "--verbose", "-v")] = False,
     _version: Annotated[
         bool, option("Print the version.", "--version", callback=_print_version, is_eager=True)

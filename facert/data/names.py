@@ -129,13 +129,15 @@ def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
     if None in positions:
         lost = wanted[positions.index(None)]
         near = nearest(lost, among)
-        hint = f"nearest: {near!r}" if near else f"{len(among)} other names"
+        found = f"no such name among {len(among)}"
+        fix = "Rename it in one of the files."
         more = positions.count(None) - 1
         also = f" (and {more} more)" if more else ""
-        raise InputError(field, f"the name {lost!r}{also}", hint, "Rename it in one of the files.")
-    found = np.array(positions, dtype=np.int64)
-    _require_different(found, wanted, among, field)
-    return found
+        hint = f"Did you mean {near!r}? {fix}" if near else fix
+        raise InputError(field, f"the name {lost!r}{also}", found, hint)
+    places = np.array(positions, dtype=np.int64)
+    _require_different(places, wanted, among, field)
+    return places
 
 
 def fitting(pattern: str, names: Sequence[str]) -> list[int]:

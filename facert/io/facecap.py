@@ -51,10 +51,12 @@ def read_facecap(path: Path) -> Take:
 
 def _shape_names(lines: Sequence[Line]) -> list[str]:
     named = [row.cells[1:] for row in lines if row.cells[0] == "bs"]
-    if len(named) != 1:
-        raise InputError(
-            "line bs", "one line with the shapes' names", f"{len(named)}", "Give a Face Cap TXT."
-        )
+    if not named:
+        expected, found = "a Face Cap recording", "no line that begins with 'bs,'"
+        raise InputError("file", expected, found, "Give a Face Cap TXT.")
+    if len(named) > 1:
+        expected = "one line with the shapes' names"
+        raise InputError("lines bs", expected, f"{len(named)}", "Export it again.")
     return named[0] if named[0] and named[0][-1] else named[0][:-1]
 
 

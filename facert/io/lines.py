@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.text import plural
 from facert.errors import InputError
 from facert.io.guarded import existing_file, read_text
 
@@ -77,7 +78,7 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
         line = f"line {reader.line_num}"
         raise InputError(line, "separated cells", str(error), "Export it again.") from error
     if len(rows) < 2:
-        raise InputError("file", "a header and rows", f"{len(rows)} lines", "Export it again.")
+        raise InputError("file", "a header and rows", plural(len(rows), "line"), "Export it again.")
     body = rows[1:] if separator == "," else _with_points(rows[1:])
     return tuple(cell.strip() for cell in rows[0].cells), body
 

@@ -175,12 +175,8 @@ KERNELS: Mapping[str, type[Kernel]] = MappingProxyType(
 def kernel_class(name: str, field: str) -> type[Kernel]:
     """The kernel of that name; raises InputError, which names the field, when there is none."""
     if name not in KERNELS:
-        raise InputError(
-            field,
-            "one of " + ", ".join(KERNELS),
-            repr(name),
-            "Choose one of these; for a model file, install the facert that wrote it.",
-        )
+        expected = "one of " + ", ".join(KERNELS)
+        raise InputError(field, expected, repr(name), "Choose one of these.")
     return KERNELS[name]
 
 

@@ -188,7 +188,9 @@ def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Give
     for name, position, value in zip(wanted, positions, values, strict=True):
         low, high = (-np.inf, np.inf) if controls.limits is None else controls.limits[position]
         slack = BEYOND * (high - low) if math.isfinite(high - low) else 0.0
-        if not (math.isfinite(value) and low - slack <= value <= high + slack):
+        if not math.isfinite(value):
+            raise InputError(name, "a number", f"{value:g}", "Give another value.")
+        if not low - slack <= value <= high + slack:
             raise InputError(
                 name, f"a value from {low:g} to {high:g}", f"{value:g}", "Keep to its limits."
             )
@@ -221,7 +223,8 @@ def _warn_if_far(controls: Controls, completion: Completion, given: Given) -> No
         if high[index] - low[index] <= BEYOND * max(abs(low[index]), 1.0):
             log.warning("%s never moves in the known poses: the others do not follow it", name)
         elif not low[index] - slack <= value <= high[index] + slack:
-            log.warning("%s is %.3g to %.3g in the known poses", name, low[index], high[index])
+            text = "%s: %.3g is outside the range of the known poses (%.3g to %.3g)"
+            log.warning(text, name, value, low[index], high[index])
     if completion.farness(given.values) > FAR:
         log.warning("no known pose comes near the given values: the others are a guess")
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.models.gaussian import Gaussian
 from facert.preprocess.cache import keep_last
 from facert.preprocess.motion.series import interpolated
@@ -71,9 +72,14 @@ class Faults:
         return np.asarray(self.zero | self.frozen | self.swapped | self.spiked)
 
     def __str__(self) -> str:
-        """Counts by kind, e.g. ``"12 frozen, 3 spiked"``; ``"none"``."""
+        """Counts by kind, e.g. ``"12 frozen, 3 spikes"``; ``"none"``."""
         counts = [(int(getattr(self, kind.name).sum()), kind.name) for kind in fields(self)]
-        return ", ".join(f"{count} {kind}" for count, kind in counts if count) or "none"
+        texts = (
+            plural(count, "spike") if kind == "spiked" else f"{count} {kind}"
+            for count, kind in counts
+            if count
+        )
+        return ", ".join(texts) or "none"
 
     def hidden_from(self, source: Source) -> Source:
         """The source with its bad markers set to NaN.

@@ -72,7 +72,11 @@ def training_data(take: Take, settings: Settings) -> TrainingData:
         When the take has too few labels, or source or poses that never change.
     """
     if take.controls is None:
-        raise InputError("/target", "poses in some frames", "none", "Pose 10 to 40 frames.")
+        fix = (
+            "Pose 10 to 40 frames: facert suggest names frames to pose, and "
+            "facert convert ... --poses poses.csv brings the poses in."
+        )
+        raise InputError("/target", "poses in some frames", "none", fix)
     prepared = prepare(take, settings)
     clean = prepared.take
     chosen = choose_training_set(clean, settings)

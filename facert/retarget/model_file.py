@@ -89,7 +89,11 @@ def read_model(path: Path, make: type[Model]) -> Model:
             raise InputError(
                 "the metadata", "a complete model", f"{error!r}", "Train the model again."
             ) from None
-        method = untrained_method(settings)
+        try:
+            method = untrained_method(settings)
+        except InputError as error:
+            error.fix = "Install the facert that wrote it."
+            raise
         method.load(
             {n.removeprefix("method."): a for n, a in arrays.items() if n.startswith("method.")}
         )

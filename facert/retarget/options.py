@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.names import fitting, instead_of
+from facert.data.names import fitting, instead_of, nearest
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.preprocess.clean_source import SourceOptions
@@ -66,7 +66,9 @@ class Adjustments:
             unknown = [entry for entry in table if entry not in ENTRIES]
             if unknown:
                 expected = "one of " + ", ".join(ENTRIES)
-                raise InputError(f"{name}.{unknown[0]}", expected, "another entry", "Remove it.")
+                near = nearest(unknown[0], ENTRIES)
+                fix = f"Did you mean {near}?" if near else "Remove it."
+                raise InputError(f"{name}.{unknown[0]}", expected, "another entry", fix)
             columns = _columns(name, names)
             if "gain" in table:
                 made.gain[columns] = _number(name, table, "gain", -LARGEST, LARGEST)

@@ -152,7 +152,7 @@ def _keys_with(values: FloatArray, keys: Sequence[int], field: str) -> IntArray:
             field,
             "a whole pose in every key frame",
             f"none in frame {bare[0]} ({len(bare)} such)",
-            "Pose it, or leave it out of --keys.",
+            "Pose it, or choose other key frames.",
         )
     return chosen
 

@@ -26,6 +26,8 @@ def test_a_folder_is_done_file_by_file_and_a_bad_one_stops_none(facert, folder, 
     assert len(lines) == 4
     assert [line for line in lines if line.startswith("failed") and "broken.h5" in line]
     assert "1 of 4 files failed" in done.err
+    again = facert("retarget", folder, "--out-dir", out, "-m", model, "-j", jobs)
+    assert "1 of 4 files failed, 3 exist already" in again.err
     single = folder / "single.h5"
     assert facert("retarget", folder / "take1.h5", single, "-m", model).code == 0
     np.testing.assert_allclose(

@@ -48,7 +48,7 @@ def test_a_wrong_name_is_reported_with_file_and_nearest_name(facert, take, tmp_p
     outcome = facert("train", take, "--regions", path, "-o", tmp_path / "model.safetensors")
     assert outcome.code == 3
     assert f"{path}: regions.all.controls: expected the name 'jawOpn'" in outcome.err
-    assert "nearest: 'jawOpen'" in outcome.err
+    assert "Did you mean 'jawOpen'?" in outcome.err
     assert not (tmp_path / "model.safetensors").exists()
 
 

@@ -267,8 +267,8 @@ def remove(path, make_take):
         (remove, (), "take.h5"),
         (spoil_nothing, ("--labels", 2), "take.h5: labels: expected at least 3"),
         (spoil_nothing, ("--labels", 99), "take.h5: labels: expected at most 12"),
-        (spoil_nothing, ("--latent-dim", 0), "the options: latent_dim: expected at least 1"),
-        (spoil_nothing, ("--optimizer", "adam"), "the options: optimizer: expected one of"),
+        (spoil_nothing, ("--latent-dim", 0), "error: --latent-dim: expected at least 1"),
+        (spoil_nothing, ("--optimizer", "adam"), "error: --optimizer: expected one of"),
         (spoil_nothing, ("--method", "magic"), "error: method: expected one of auto"),
     ],
 )
@@ -288,7 +288,10 @@ def test_bad_input_gets_one_line_and_leaves_no_file(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("latent_dims = 8", "latent_dims: expected one of"),
+        (
+            "latent_dims = 8",
+            "latent_dims: expected a setting, found an unknown name. Did you mean latent_dim?",
+        ),
         ("latent_dim = 'many'", "latent_dim: expected int"),
         ("latent_dim = ", "file: expected TOML"),
         ("sigma_c = inf", "sigma_c: expected a finite number"),

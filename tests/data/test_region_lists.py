@@ -30,8 +30,12 @@ def test_names_are_spelled_as_in_the_take():
 @pytest.mark.parametrize(
     ("markers", "controls", "message"),
     [
-        (["chin", "lips", "browR", "browL"], CONTROLS, "mouth.markers.*'lip'.*nearest: 'lips'"),
-        (MARKERS, ["jawOpn", "sneer", "browUp"], "mouth.controls.*'jawOpen'.*nearest: 'jawOpn'"),
+        (["chin", "lips", "browR", "browL"], CONTROLS, "mouth.markers.*'lip'.*Did you mean 'lips'"),
+        (
+            MARKERS,
+            ["jawOpn", "sneer", "browUp"],
+            "mouth.controls.*'jawOpen'.*Did you mean 'jawOpn'",
+        ),
         (MARKERS, [*CONTROLS, "blink", "wink"], "every control.*'blink' and 1 more in none"),
     ],
 )

@@ -40,13 +40,13 @@ def test_a_comma_at_the_end_of_lines_is_no_column(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "line bs"),
-        ("time,jawOpen\n0,1\n", "Give a Face Cap TXT"),
+        ("", "file: expected a Face Cap recording"),
+        ("time,jawOpen\n0,1\n", "found no line that begins with 'bs,'.* Give a Face Cap TXT"),
         (HEAD, "expected lines of frames"),
         (f"{HEAD}k,0,{POSE},1,2\n", "line 3: expected 15 cells"),
         (f"{HEAD}k,0,{POSE},1,2,x\n", "line 3, column mouthSmile_R"),
         (f"{HEAD}k,5,{POSE},1,2,3\nk,5,{POSE},1,2,3\n", "/time"),
-        (f"{HEAD}{HEAD}k,5,{POSE},1,2,3\n", "line bs: expected one line"),
+        (f"{HEAD}{HEAD}k,5,{POSE},1,2,3\n", "lines bs: expected one line"),
         (HEAD.replace("eyeBlink_L", "browInnerUp") + f"k,0,{POSE},1,2,3\n", "twice"),
     ],
 )

@@ -103,7 +103,7 @@ def test_values_far_from_every_known_pose_are_warned_of(trained, start, caplog, 
         ({}, {}, "given controls: expected at least one"),
         ({"jawOpenn": 0.1}, {}, "Did you mean 'jawOpen'\\?"),
         ({"jawOpen": 3.1}, {}, "jawOpen: expected a value from -3 to 3, found 3.1"),
-        ({"jawOpen": np.nan}, {}, "jawOpen: expected a value"),
+        ({"jawOpen": np.nan}, {}, "jawOpen: expected a number, found nan"),
         ({"jawOpen": 0.1, "jaw_open": 0.2}, {}, "a name each for 'jawOpen' and 'jaw_open'"),
         ({"jawOpen": 0.1}, {"soft": -1.0}, "soft: expected"),
         ({"jawOpen": 0.1}, {"samples": -1}, "samples: expected"),
@@ -134,7 +134,7 @@ def test_without_known_poses_there_is_no_answer(trained, make_take):
 
 def test_values_beyond_the_known_poses_are_warned_of(take, caplog):
     facert.complete_pose(replace(take, controls=LIMITED), {"jawOpen": 2.9})
-    assert "jawOpen is -" in caplog.text
+    assert "jawOpen: 2.9 is outside the range of the known poses (-" in caplog.text
     assert "no known pose comes near" in caplog.text
 
 

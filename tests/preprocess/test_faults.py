@@ -108,7 +108,7 @@ def test_faults_are_counted_by_kind_and_hidden(face):
     markers[10:20, 3] = 0.0
     markers[200, 10] += 3.0
     faults = find_faults(source(markers))
-    assert str(faults) == "10 zero, 1 spiked"
+    assert str(faults) == "10 zero, 1 spike"
     hidden = faults.hidden_from(source(markers))
     np.testing.assert_array_equal(~hidden.valid, faults.any)
     np.testing.assert_array_equal(hidden.values[~faults.any], markers[~faults.any])

@@ -57,7 +57,7 @@ def test_a_name_without_its_side_is_answered_with_the_pattern_for_both():
         ({"jawOpne": {"gain": 1.0}}, "jawOpen"),
         ({"lid*": {"gain": 1.0}}, "pattern"),
         ({"jawOpen": 1.0}, "table"),
-        ({"jawOpen": {"gian": 1.0}}, "gain"),
+        ({"jawOpen": {"gian": 1.0}}, r"Did you mean gain\?"),
         ({"jawOpen": {"gain": "much"}}, "number"),
         ({"jawOpen": {"gain": True}}, "number"),
         ({"jawOpen": {"smoothing": 1.5}}, "from 0 to 1"),

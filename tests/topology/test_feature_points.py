@@ -44,7 +44,7 @@ def test_a_map_names_vertices_in_any_spelling_and_leaves_points_out():
     points, vertices = mapped_vertices({"Chin": 7, "lip_L": 3}, ["lipLeft", "brow", "chin"])
     assert points.tolist() == [2, 0]
     assert vertices.tolist() == [7, 3]
-    with pytest.raises(InputError, match="nearest: 'chin'"):
+    with pytest.raises(InputError, match="Did you mean 'chin'"):
         mapped_vertices({"chinn": 7}, ["chin", "brow"])
     for vertex in ("7", 7.0, True, {"a": 1}):
         with pytest.raises(InputError, match="number of a vertex"):

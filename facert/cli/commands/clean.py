@@ -21,6 +21,7 @@ from facert.cli.shared.options import (
     option,
 )
 from facert.errors import reading
+from facert.io.registry import listed
 
 if TYPE_CHECKING:
     from facert.data.take import Take
@@ -33,8 +34,8 @@ def command(
         list[Path],
         argument(
             "IN OUT",
-            "Take with gaps and noise, and result: .h5, with its uncertainty, or .csv. With "
-            "--out-dir: any number of takes, or folders of takes.",
+            f"Take with gaps and noise, and result: {listed('write', 'take')}; .h5 keeps its "
+            "uncertainty. With --out-dir: any number of takes, or folders of takes.",
         ),
     ],
     model: Annotated[

@@ -54,7 +54,9 @@ def command(
         float | None, option("Frames a second of OUT: resampled by time.", min=1e-3)
     ] = None,
     in_units: Annotated[str, option("Unit of IN, instead of the one it states.")] = "",
-    units: Annotated[str, option("Unit of OUT: m, cm, mm, in or ft; numbers are converted.")] = "",
+    units: Annotated[
+        str, option("Unit of OUT: m, dm, cm, mm, in or ft; numbers are converted.")
+    ] = "",
     in_up_axis: Annotated[str, option("The axis up in IN, instead of the one it states.")] = "",
     up_axis: Annotated[str, option("The axis up in OUT: y, z or x; turned.")] = "",
     start_timecode: Annotated[str, option("Of the first frame, HH:MM:SS:FF.")] = "",

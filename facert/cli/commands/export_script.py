@@ -21,10 +21,10 @@ def command(
     ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:
-    """Print a Python script that keys a character with curves (.json or .csv) of facert.
+    """Print a Python script that animates a character by curves (.json or .csv) of facert.
 
-    It keys the shape keys of a Blender object, or the attributes of a Maya node, by time. How to
-    run it stands at its top.
+    It sets keys on the shape keys of a Blender object, or the attributes of a Maya node, by time.
+    Its first lines explain how to run it.
 
     facert export-script blender -o facert_curves.py
     facert export-script maya > facert_maya.py

@@ -10,9 +10,12 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.options import AS_JSON, SHAPES, TARGET, argument
+from facert.data.text import plural
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+_LABELS = {"deviations": "standard deviations"}
 
 
 def command(
@@ -32,7 +35,7 @@ def command(
     if as_json:
         typer.echo(json.dumps({"file": str(path), **facts}, indent=2, ensure_ascii=False))
     else:
-        shown = _model_facts(facts) if facts["kind"] == "model" else facts
+        shown = _model_facts(facts) if facts["kind"] == "model" else _take_facts(facts)
         console.out.print(_table(path.name, shown), soft_wrap=False)
 
 
@@ -67,8 +70,15 @@ def _model_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
     settings, figures = facts["settings"], facts["figures"]
     idle = () if method_class(settings["method"]).stepwise else OF_SHARED
     used = {name: value for name, value in settings.items() if name not in idle}
-    named = {console.FIGURES.get(name, name): value for name, value in figures.items()}
+    named = {console.figure_label(name): value for name, value in figures.items()}
     return {**facts, "settings": used, "figures": named}
+
+
+def _take_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a take or a rig, for people: the targets of a file, a line for each."""
+    shown = dict(facts)
+    targets = shown.pop("controls_of_targets", {})
+    return shown | {f"target {name}": plural(count, "control") for name, count in targets.items()}
 
 
 def _table(title: str, facts: Mapping[str, Any]) -> Table:
@@ -88,7 +98,7 @@ def _table(title: str, facts: Mapping[str, Any]) -> Table:
 def _lines(facts: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     """Label and text of every fact that is not empty, parts below their whole."""
     for key, value in facts.items():
-        label = prefix + key.replace("_", " ")
+        label = prefix + _LABELS.get(key, key.replace("_", " "))
         if isinstance(value, Mapping):
             yield from _lines(value, f"{label} ")
         elif value not in ("", (), [], None):

@@ -10,6 +10,7 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, numbers, option
 from facert.data.text import plural
+from facert.io.registry import listed
 from facert.settings import LimitRule
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 def command(
     source: Annotated[Path, argument("IN", "A take: markers or weights, some frames posed.")],
-    output: Annotated[Path, argument("OUT", "Result: .h5, .csv.")],
+    output: Annotated[Path, argument("OUT", f"Result: {listed('write', 'take')}.")],
     keys: Annotated[str, option("Key frames, as in 0,12,30; by default all that are posed.")] = "",
     every: Annotated[
         int | None, option("Instead: every so many frames, and the last.", min=1)

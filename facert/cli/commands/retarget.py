@@ -145,7 +145,9 @@ def _print_error(take: Take, result: Take, retargeter: Retargeter) -> None:
         return
     unseen = retargeter.without_known(shared.truth)
     if not len(unseen.labels):
-        console.log.info("no pose in the input that it was surely not trained on: no error shown")
+        console.log.info(
+            "no error shown: the input's poses were, or may have been, used in training"
+        )
         return
     # Where the input lacks controls of the model, its poses may be known ones.
     trust = "" if shared.of_result else " that it was not trained on"

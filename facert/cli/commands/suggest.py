@@ -152,5 +152,6 @@ def _print(rows: Sequence[dict[str, object]]) -> None:
     for row in rows:
         table.add_row(str(row["frame"]), _moment(row), f"{row['share']:.1%}")
     console.out.print(table)
+    console.show("stands for: the share of the take's frames that are nearest to it")
     in_time = sorted((str(row["frame"]) for row in rows), key=int)
     console.show(f"in order of time: {','.join(in_time)}")

@@ -144,8 +144,13 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
     if config is not None:
         with reading(config):
             settings = settings.with_changes(read_toml(config, "latent_dim = 8"))
-    with reading("the options"):
-        return settings.with_changes({k: v for k, v in options.items() if v is not None})
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return settings.with_changes(given)
+    except InputError as error:
+        if error.field in given:
+            error.field = f"--{error.field.replace('_', '-')}"
+        raise
 
 
 def _regions(given: str | None) -> Regions | str | None:
@@ -217,7 +222,7 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
     table = Table(title=title, show_header=False)
     for name, value in figures.items():
         table.add_row(
-            console.FIGURES.get(name, name),
+            console.figure_label(name),
             _shown(value) if isinstance(value, float) else str(value),
         )
     console.out.print(table)

@@ -98,7 +98,9 @@ def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
         failed += error is not None
         console.show(f"failed  {error}" if error else f"done    {file}")
     if failed:
-        console.err.print(f"{failed} of {len(wanted)} files failed", style="red")
+        there = len(todo.pairs) - len(wanted)
+        left = f", {there} {'exists' if there == 1 else 'exist'} already" if there else ""
+        console.err.print(f"{failed} of {len(todo.pairs)} files failed{left}", style="red")
         raise typer.Exit(1)
 
 

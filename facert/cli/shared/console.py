@@ -22,8 +22,13 @@ class _StderrHandler(logging.Handler):
         err.print(prefix + self.format(record), style="yellow" if warning else None, markup=False)
 
 
-FIGURES = {"seconds": "training seconds"}
-"""Better names for figures of a model."""
+_FIGURES = {"seconds": "training seconds", "motion a frame": "motion per frame"}
+
+
+def figure_label(name: str) -> str:
+    """A figure of a model, with its unit if it has one, by the name that people are shown."""
+    figure, comma, unit = name.partition(", ")
+    return f"{_FIGURES.get(figure, figure)}{comma}{unit}"
 
 
 def show(text: str) -> None:

@@ -20,6 +20,9 @@ FILES = "Files"
 """The last panel: what is read beside a take, and what is written where."""
 VALUES = {"path": "FILE", "str": "TEXT", "int": "N", "float": "X"}
 """What stands for a value of a type that has no name of its own."""
+RESULT = "retargeted.h5"
+"""A file that examples take; the example that writes it is `RETARGET`."""
+RETARGET = f"facert retarget facert-demo/performance.h5 {RESULT}"
 
 Row = tuple[str, Text]
 
@@ -72,6 +75,8 @@ def _print_help(command: TyperCommand | TyperGroup, ctx: Any) -> None:
     if examples(command):
         lines = "\n".join(f"  {line}" for line in examples(command))
         console.print(Text(f"\nExamples\n{lines}"), soft_wrap=True)
+        if RESULT in lines and RETARGET not in lines:
+            console.print(Text(f"\nTo make {RESULT}\n  {RETARGET}"), soft_wrap=True)
 
 
 def _panel(name: str, rows: Iterable[Row], width: int) -> Panel:

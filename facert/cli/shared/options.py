@@ -38,7 +38,9 @@ AS_JSON = Annotated[bool, option("Print JSON, for programs.", "--json")]
 NO_DETECT = Annotated[
     bool, option("Take every marker as observed, even what looks bad.", "--no-detect")
 ]
-NO_SMOOTH = Annotated[bool, option("Map every frame as it was measured.", "--no-smooth")]
+NO_SMOOTH = Annotated[
+    bool, option("Map the measured frames, without removing their noise.", "--no-smooth")
+]
 SIGMA = Annotated[
     float | None,
     option("Standard deviation of the capture noise in the take's units; else estimated.", min=0.0),

@@ -70,7 +70,7 @@ class MotionEstimate:
     def summary(self, unit: str) -> str:
         """Noise and motion, for people."""
         unit = f" {unit}" if unit else ""
-        return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} a frame"
+        return f"capture noise {self.sigma:.2g}{unit}, motion {self.sigma_t:.2g}{unit} per frame"
 
 
 @keep_last
