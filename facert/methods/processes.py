@@ -155,7 +155,8 @@ class ProcessBank:
         distances = self._norms + squares
         distances -= products
         np.maximum(distances, 0.0, out=distances)
-        k = squared_exponential(distances.take(self._of, axis=0), self._theta1, self._theta2)
+        k = squared_exponential(distances.take(self._of, axis=0), self._theta2)
+        k *= self._theta1
         k += self._half_theta4 * products.take(self._of, axis=0)
         poses = np.matmul(k, self._alpha)
         poses += self._means

@@ -40,7 +40,7 @@ class PackedMap(Map):
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
         squared = cdist(X, self.X, "sqeuclidean")[:, None, :]
-        k = squared_exponential(squared, 1.0, 2.0 * self.inverse_widths[:, None])
+        k = squared_exponential(squared, 2.0 * self.inverse_widths[:, None])
         packed = self.duals.reshape(-1, self.duals.shape[2])
         return k.reshape(len(X), len(packed)) @ packed + self.offset, None
 
@@ -72,7 +72,7 @@ class SVR(SupervisedRegression):
         squared = cdist(X, X, "sqeuclidean")
         # Labels that are all the same have no width of their own.
         inverse_widths = np.array(INVERSE_WIDTHS) / (float(squared.mean()) or 1.0)
-        kernels = squared_exponential(squared, 1.0, 2.0 * inverse_widths[:, None, None])
+        kernels = squared_exponential(squared, 2.0 * inverse_widths[:, None, None])
         mean, scale = Y.mean(axis=0), Y.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)  # a control that never moves
         T = (Y - mean) / scale

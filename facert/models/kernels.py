@@ -100,10 +100,9 @@ class Kernel(ABC):
         return K
 
 
-def squared_exponential(squared: Array, variance: Any, inverse_width: Any) -> Array:
-    """θ1 exp(-θ2/2 s), Eq. (3); the parameters are numbers, or arrays that broadcast."""
+def squared_exponential(squared: Array, inverse_width: Any) -> Array:
+    """exp(-θ2/2 s), Eq. (3) with θ1 = 1; θ2 is a number, or an array that broadcasts."""
     k: Array = _exp(squared * (-0.5 * inverse_width))
-    k *= variance
     return k
 
 
@@ -113,7 +112,9 @@ class SquaredExponential(Kernel):
 
     def value(self, squared: Array) -> Array:
         """k(s)."""
-        return squared_exponential(squared, self.variance, self.inverse_width)
+        k = squared_exponential(squared, self.inverse_width)
+        k *= self.variance
+        return k
 
     def relative_slope(self, squared: Array) -> float:  # noqa: ARG002  the same everywhere
         """k'/k = -θ2/2."""

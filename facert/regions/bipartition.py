@@ -73,7 +73,7 @@ def _nearness(places: FloatArray) -> FloatArray:
     """exp(-|p_i - p_j|² / 2h²), (M, M)."""
     squared = np.sum((places[:, None] - places) ** 2, axis=2)
     h = 2.0 * np.sqrt(np.median(np.sort(squared, axis=1)[:, NEIGHBOUR]))
-    return squared_exponential(squared, 1.0, 1.0 / max(h**2, np.finfo(np.float64).tiny))
+    return squared_exponential(squared, 1.0 / max(h**2, np.finfo(np.float64).tiny))
 
 
 def _order(ties: FloatArray) -> FloatArray:

@@ -118,7 +118,7 @@ class _Kernels:
     def _bell(self, frames: FloatArray, linear: FloatArray) -> FloatArray:
         """The exponential of the distances, without a mean over the keys in each row, (G, n, K)."""
         squared = self._powers(frames)[:, :, None] + self._own[:, None, :] - 2.0 * linear
-        bell: FloatArray = squared_exponential(squared, 1.0, 1.0 / (LENGTH**2 * self._size))
+        bell: FloatArray = squared_exponential(squared, 1.0 / (LENGTH**2 * self._size))
         return np.asarray(bell - bell.mean(axis=2, keepdims=True))
 
     def _powers(self, frames: FloatArray) -> FloatArray:

@@ -89,7 +89,7 @@ class _Profile:
 
     def __call__(self, v: FloatArray) -> tuple[float, FloatArray]:
         w, nu, lam = np.exp(v)
-        C = squared_exponential(self.D, 1.0, w)
+        C = squared_exponential(self.D, w)
         R_inverse, log_determinant = self._inverse(C, nu, lam)
         A = R_inverse @ self.Y
         n, d = self.Y.shape
@@ -107,7 +107,7 @@ class _Profile:
     def kernel(self, v: FloatArray) -> RegressionKernel:
         """The kernel in the units of the data, with the best scale."""
         w, nu, lam = np.exp(v).tolist()
-        R_inverse, _ = self._inverse(squared_exponential(self.D, 1.0, w), nu, lam)
+        R_inverse, _ = self._inverse(squared_exponential(self.D, w), nu, lam)
         s = self._scale(R_inverse @ self.Y)
         return RegressionKernel(
             variance=s / (1.0 + lam),
