@@ -10,6 +10,7 @@ import typer.main
 
 from facert.cli.app import app
 from facert.cli.shared.help import examples
+from facert.data.units import METRES
 from facert.demo import write_demo
 from facert.settings import DESCRIBED, FINE
 
@@ -78,6 +79,11 @@ def test_help_ends_with_two_examples(facert, name):
     assert len(lines) == 2
     shown = facert(*name.split(), "--help").out.rstrip()
     assert shown.endswith("\n".join(["Examples", *(f"  {one}" for one in lines)]))
+
+
+def test_units_are_listed_as_they_are_known():
+    units = next(param for param in COMMANDS["convert"].params if param.name == "units")
+    assert f"{', '.join(METRES)};".replace(", ft", " or ft") in units.help
 
 
 @pytest.mark.parametrize(("name", "line"), EXAMPLES)

@@ -74,9 +74,9 @@ def _print_help(command: TyperCommand | TyperGroup, ctx: Any) -> None:
         console.print(_panel(name, panels[name], width))
     if examples(command):
         lines = "\n".join(f"  {line}" for line in examples(command))
-        console.print(Text(f"\nExamples\n{lines}"), soft_wrap=True)
         if RESULT in lines and RETARGET not in lines:
-            console.print(Text(f"\nTo make {RESULT}\n  {RETARGET}"), soft_wrap=True)
+            console.print(Text(f"\nTo make the examples' {RESULT}\n  {RETARGET}"), soft_wrap=True)
+        console.print(Text(f"\nExamples\n{lines}"), soft_wrap=True)
 
 
 def _panel(name: str, rows: Iterable[Row], width: int) -> Panel:
