@@ -124,4 +124,4 @@ def _active(values: FloatArray) -> BoolArray:
 
 
 def _pick(names: tuple[str, ...], chosen: BoolArray) -> tuple[str, ...]:
-    return tuple(name for name, take in zip(names, chosen, strict=True) if take)
+    return tuple(name for name, wanted in zip(names, chosen, strict=True) if wanted)

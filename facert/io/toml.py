@@ -67,5 +67,5 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _quoted(name: str) -> str:
-    """A basic string of TOML; JSON spells all but one sign as it does."""
+    """A name as a basic string of TOML; JSON escapes all but one character alike."""
     return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -125,6 +125,6 @@ def determined(shape: FloatArray, seen: BoolArray) -> BoolArray:
 
 
 def mean_motion(motion: RigidMotion) -> RigidMotion:
-    """The average motion, one frame."""
+    """Mean of the motions of all frames, as a single frame."""
     rotation = Rotation.from_matrix(motion.rotations).mean().as_matrix()
     return RigidMotion(rotation[None], motion.translations.mean(axis=0, keepdims=True))

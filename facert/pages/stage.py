@@ -101,7 +101,7 @@ class FacePart(Part):
     def __init__(self, server: ViserServer, label: str, mesh: Mesh, own: Paint) -> None:
         super().__init__(server, label, mesh.vertices)
         self._faces, self._own = mesh.faces, own
-        self._worn: Paint | None = None
+        self._applied: Paint | None = None
         self._layers: list[ColourLayer] = []
         self._meshes = [
             server.scene.add_mesh_simple(
@@ -120,29 +120,29 @@ class FacePart(Part):
         if not np.isfinite(vertices).all():
             for mesh in self._meshes:
                 mesh.visible = False
-            self._worn = None
+            self._applied = None
             return
         placed = self._placed(vertices)
         sunk = placed - APRON * vertex_normals(placed, self._faces)
         with self._server.atomic():
-            self._wear(paint or self._own)
+            self._apply_paint(paint or self._own)
             for mesh, layer in zip(self._meshes, self._layers, strict=False):
                 if len(layer.faces):
                     chosen = np.where(layer.own[:, None], placed[layer.used], sunk[layer.used])
                     mesh.vertices = chosen.astype(np.float32)
 
-    def _wear(self, paint: Paint) -> None:
-        """Sort the triangles by their colours."""
-        if self._worn is paint:
+    def _apply_paint(self, paint: Paint) -> None:
+        """Show the mesh in these colours: one layer of triangles for each."""
+        if self._applied is paint:
             return
-        self._worn = paint
+        self._applied = paint
         self._layers = [
             colour_layer(self._faces, paint.paint == k) for k in range(len(paint.palette))
         ]
         for index, mesh in enumerate(self._meshes):
-            there = index < len(self._layers) and len(self._layers[index].faces) > 0
-            mesh.visible = there
-            if there:
+            used = index < len(self._layers) and len(self._layers[index].faces) > 0
+            mesh.visible = used
+            if used:
                 mesh.faces = self._layers[index].faces.astype(np.uint32)
                 red, green, blue = np.rint(255 * paint.palette[index]).astype(int).tolist()
                 mesh.color = (red, green, blue)

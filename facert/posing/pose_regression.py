@@ -68,7 +68,7 @@ class PoseRegression:
         return self.mean + _kernel(self.distances(values), products) @ self.weights
 
     def distances(self, values: FloatArray) -> FloatArray:
-        """d/d̄ of values (B, k) from every known pose, (B, n)."""
+        """Distances d/d̄ of values (B, k) from every known pose, (B, n)."""
         inputs = (values - self.centre) / self.scale
         return np.asarray(cdist(inputs, self.inputs) / self.distance)
 

@@ -43,11 +43,11 @@ FREE = 10.0  # variance of the constant, relative to the same
 class TakeSample:
     """Frames and labels of a take that its regions are found from."""
 
-    # Those markers, or weights, that are seen at all
+    # Names of the markers, or weights, that are seen at all
     markers: tuple[str, ...]
     controls: tuple[str, ...]
     frames: FloatArray  # (n, M, 3) or (n, M): Complete
-    labelled: FloatArray  # (l, M, 3) or (l, M): Those with a pose
+    labelled: FloatArray  # (l, M, 3) or (l, M): Frames with a pose
     poses: FloatArray  # (l, P): Their poses
     moving: BoolArray  # (P,): Whether any known pose moves a control
 

@@ -135,7 +135,7 @@ class CurveLog(Monitor):
         return None
 
     def iteration(self, state: State) -> None:
-        """Write one line."""
+        """Append the line of an iteration."""
         seconds = time.perf_counter() - self._began
         # Closed after each line: the log can be followed, and survives a killed run.
         with self.path.open("a", encoding="utf-8") as file:

@@ -18,7 +18,7 @@ SHOWN = 4  # components that a message lists
 
 
 def checked_labels(labels: ArrayLike, points: int) -> IntArray:
-    """The labelled points as indices, (M,).
+    """Check labelled points; return them as indices, (M,).
 
     Raises
     ------

@@ -28,7 +28,7 @@ class Propagation:
     method: str = "residual"
     width: int | None = None
     dim: int | None = None
-    # What poses are clipped to: the limits that the take declares; ``"auto"`` falls back on the
+    # Limits that poses are clipped to: those that the take declares; ``"auto"`` falls back on the
     # range of its key poses and animation
     limits: LimitRule = "auto"
 

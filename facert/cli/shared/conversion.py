@@ -103,8 +103,8 @@ def _motion(take: Take, wanted: Wanted, changes: Changes) -> Morphs:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
     with reading(wanted.rig):
         rig = formats.read_rig_file(wanted.rig, wanted.shapes)
-        # What IN holds, `--in-units`, is not that of a rig which states its own unit; and the axis
-        # that is up is the rig's own.
+        # `--in-units` is the unit of IN: a rig that states its own unit keeps that, and in any case
+        # its own up axis.
         stated = rig.units or changes.in_units
         in_unit = in_space(rig, Changes(in_units=stated, units=changes.units))
     assert isinstance(in_unit, Rig)  # as it went in

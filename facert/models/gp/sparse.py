@@ -148,7 +148,7 @@ def factorise(
     Parameters
     ----------
     K_mm, K_mn : Tensor, shapes (m, m) and (m, n)
-        Without noise and jitter.
+        Kernel matrices without noise and jitter.
     weights : Tensor, shape (n,)
     variance, noise : float
         θ1 and θ3⁻¹.
@@ -165,10 +165,10 @@ def factorise(
     L = cholesky(K_mm + JITTER * variance * identity)
     L_inverse = torch.linalg.solve_triangular(L, identity, upper=False)
     V = L_inverse @ K_mn
-    left = (variance - V.square().sum(0)).clamp_(min=0.0)
+    left = (variance - V.square().sum(0)).clamp_(min=0.0)  # diag(K - Q)
     residual = Residual(left, weights, noise, columns)
-    diagonal = approximation.diagonal(residual)
-    A = V * diagonal.rsqrt()
+    diagonal = approximation.diagonal(residual)  # Λ
+    A = V * diagonal.rsqrt()  # V Λ^-½, and below B = I + A Aᵀ
     return SparseFactors(
         L_inverse, V, A, cholesky(torch.addmm(identity, A, A.T)), diagonal, residual
     )

@@ -140,7 +140,7 @@ class SourceMapping:
 
     def __init__(self, view: Predictor) -> None:
         self.view = view
-        # F at every training latent is the search for a start: keep what does not change.
+        # The search for a start takes F at every training latent: compute once what is constant.
         at, xp = view.predict(view.Z), namespace(view.Z)
         self._train_variance = float(at.variance.mean())  # it varies little, and serves all
         self._train_means = xp.concatenate([0.5 * at.mean**2, -at.mean], axis=1).T

@@ -165,7 +165,7 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 def _smoothed(
     filtered: list[FactorUpdate], F: FloatArray, before: FloatArray, after: FloatArray
 ) -> Smoothed:
-    """The backward pass; `before` and `after`, (T, ..., 2 q), are means, and are changed."""
+    """The backward pass; overwrites the filter's means `before` and `after`, (T, ..., 2 q)."""
     frames, q = len(filtered), F.shape[0] // 2
     P = filtered[-1].after
     covariance = np.empty((frames, *P.shape[:-2], q, q))
