@@ -46,5 +46,15 @@ def method_class(name: str) -> type[Method]:
 
 
 def make_method(settings: Settings) -> Method:
-    """A method by the name in the settings; raises InputError when there is none of that name."""
+    """The method that the settings name, untrained; raises InputError as `require_known` does."""
+    require_known(settings)
     return method_class(settings.method)(settings)
+
+
+def require_known(settings: Settings) -> None:
+    """Raise InputError when the settings name a method or a kernel that facert does not have."""
+    from facert.models.kernels import kernel_class  # NumPy, which the names do without
+
+    method_class(settings.method)
+    for field in ("source_kernel", "target_kernel"):
+        kernel_class(getattr(settings, field), field)

@@ -80,7 +80,7 @@ def read_model(path: Path, make: type[Model]) -> Model:
             bounds = Controls(controls.names, arrays.get("target.bounds")).limits
             figures = dict(metadata.get("figures", {}))
             # Earlier releases counted the labels in the figures alone.
-            labels = int(metadata.get("labels") or figures.get("labelled frames", 0))
+            labels = _count(metadata.get("labels") or figures.get("labelled frames", 0))
             source_units, target_units = (
                 Normalisation(arrays[f"{view}.mean"], float(arrays[f"{view}.scale"].item()))
                 for view in ("source", "target")
@@ -114,6 +114,12 @@ def read_model(path: Path, make: type[Model]) -> Model:
         )
         _check_fit(model, arrays, metadata)
     return model
+
+
+def _count(value: object) -> int:
+    if not isinstance(value, (int, float)) or value != abs(value) or value % 1:
+        raise ValueError(f"{value!r} labels")
+    return int(value)
 
 
 def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:

@@ -11,7 +11,7 @@ from facert.data.normalisation import Normalisation
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError
-from facert.methods.registry import method_class
+from facert.methods.registry import method_class, require_known
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.preparation import TrainingData, training_data
@@ -52,6 +52,7 @@ def train(
         settings = Settings() if start is None else replace(start.settings, labels=None)
     if settings.unlabelled is None:
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
+    require_known(settings)
     check_poses(take)
     data = training_data(take, settings)
     begin_at = None if start is None else _start(start, data)

@@ -93,6 +93,9 @@ def tampered(model, **changes):
         ({"motion.rest": np.zeros(15)}, "motion: expected numbers above 0"),
         ({"motion_scale": 3.0}, "motion: expected the unit of the source"),
         ({"labels": "many"}, "the metadata"),
+        ({"labels": float("inf")}, "the metadata"),
+        ({"labels": -1}, "the metadata"),
+        ({"labels": 2.5}, "the metadata"),
         ({"source_names": ["a"] * 5}, "names"),
         ({"source_names": None}, "the metadata"),
         ({"source_kind": "smells"}, "source_kind"),
@@ -159,3 +162,9 @@ def test_a_file_that_names_no_kernels_has_the_papers(shared, shared_model, take)
 def test_a_file_of_an_earlier_release_has_its_labels_counted_in_the_figures(model, retargeter):
     loaded = facert.load(tampered(model, labels=None, motion_scale=None))
     assert loaded.labels == retargeter.labels == len(retargeter.labelled)
+
+
+@pytest.mark.parametrize("method", ["ridge", "ssgplvm"])
+def test_an_unknown_kernel_is_refused_whatever_the_method(take, method):
+    with pytest.raises(InputError, match=r"target_kernel: expected one of .*, found 'cubic'"):
+        facert.train(take, Settings(method=method, target_kernel="cubic"))
