@@ -14,6 +14,7 @@ from facert.models.kernels import (
     initial_log_kernel,
     kernel_class,
 )
+from facert.settings import DESCRIBED
 
 THETA = {"variance": 1.7, "inverse_width": 0.6, "noise": 0.03}
 KERNEL = SquaredExponential(**THETA)
@@ -104,3 +105,8 @@ def test_the_noise_never_falls_below_its_floor(kernel):
     log_kernel = initial_log_kernel()
     log_kernel[2] = -1000.0
     assert type(kernel).from_log(log_kernel, 0.05).noise == 0.05
+
+
+def test_the_help_names_every_kernel():
+    _, about = DESCRIBED["source_kernel"]
+    assert all(name in about.help for name in KERNELS)
