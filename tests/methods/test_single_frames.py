@@ -80,6 +80,13 @@ def alone(process, frames):
     return process.mean + solved.T @ given.Y, variance
 
 
+def test_limits_take_from_factors_what_they_do_in_a_batch(blend, problem):
+    factors = blend.factors
+    assert 0 < factors.censored.sum() < factors.censored.size
+    expected = factors(problem[2])[0]
+    np.testing.assert_allclose([factors(x[None])[0][0] for x in problem[2]], expected, atol=1e-12)
+
+
 def test_far_off_frames_are_no_special_case(blend, problem):
     far = 100.0 * problem[2][:5]
     assert_rows_are_the_batch(blend, far, atol=1e-7)
