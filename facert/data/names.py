@@ -8,7 +8,6 @@ the separators and the way to write the side.
 from __future__ import annotations
 
 import difflib
-import re
 from collections import Counter
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
@@ -16,6 +15,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.spelling import PARTS, SIDES, folded, part_of_face, words
 from facert.errors import InputError
 
 _SHAPES = """
@@ -41,38 +41,6 @@ ARKIT_ANGLES = tuple(_ANGLES.split())
 """The nine angles that follow them, in radians."""
 
 ARKIT_NAMES = ARKIT_SHAPES + ARKIT_ANGLES
-
-_SIDES = {"l": "left", "r": "right"}
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[-+]?\d+|[^\W\d_a-zA-Z]+")
-_BETWEEN_NUMBERS = re.compile(r"(?<=\d) (?=\d)")
-
-# The first word of a name that begins like one of these decides the group.
-_GROUP_STEMS = {
-    "brows": ("brow", "eyebrow", "forehead"),
-    "eyes": ("eye", "lid", "gaze", "blink", "pupil"),
-    "nose": ("nose", "nostril"),
-    "cheeks": ("cheek",),
-    "mouth": ("mouth", "lip", "tongue", "teeth", "smile"),
-    "jaw": ("jaw", "chin"),
-    "head": ("head", "neck"),
-}
-OTHER = "other"
-
-
-def words(name: str) -> tuple[str, ...]:
-    """The words of a name in lower case, numbers with their sign, ``l`` and ``r`` written out."""
-    found = (word.lower() for word in _WORD.findall(name))
-    return tuple(_SIDES.get(word, word) for word in found)
-
-
-def folded(name: str) -> str:
-    """The form that all spellings of a name share: its words, with a mark between two numbers.
-
-    >>> folded("EyeBlink_L"), folded("eye-blink-left"), folded("m1.12"), folded("m11.2")
-    ('eyeblinkleft', 'eyeblinkleft', 'm1_12', 'm11_2')
-    """
-    return _BETWEEN_NUMBERS.sub("_", " ".join(words(name))).replace(" ", "") or name
-
 
 _ARKIT_SPELLING = {folded(name): name for name in ARKIT_NAMES}
 
@@ -169,7 +137,7 @@ def instead_of(name: str, among: Sequence[str]) -> str | None:
 
 
 def _without_side(name: str) -> tuple[str, ...]:
-    return tuple(word for word in words(name) if word not in _SIDES.values())
+    return tuple(word for word in words(name) if word not in SIDES)
 
 
 def _require_different(
@@ -230,18 +198,10 @@ def control_groups(names: Sequence[str]) -> dict[str, IntArray]:
     eyes, nose, cheeks, mouth, jaw, head, other; in this order, empty ones left out) to the indices
     of its controls. Each control is in one group.
     """
-    groups = [_group(name) for name in names]
+    groups = [part_of_face(name) for name in names]
     present = Counter(groups)
     return {
         group: np.array([i for i, found in enumerate(groups) if found == group], dtype=np.int64)
-        for group in (*_GROUP_STEMS, OTHER)
+        for group in PARTS
         if present[group]
     }
-
-
-def _group(name: str) -> str:
-    for word in words(name):
-        for group, stems in _GROUP_STEMS.items():
-            if word.startswith(stems):
-                return group
-    return OTHER

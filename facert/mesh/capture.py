@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import NameIndex, folded
+from facert.data.names import NameIndex
 from facert.data.rig import Rig
+from facert.data.spelling import folded
 from facert.data.take import Controls, Source, Take
 from facert.data.text import plural
 from facert.errors import InputError

@@ -1,0 +1,116 @@
+"""The words that a name is made of, whatever their case, what parts them and the form of Unicode.
+
+Programs spell one name in many ways: ``EyeBlinkLeft``, ``eyeBlink_L``, ``eye-blink.left``; macOS
+writes ``é`` as two characters, other systems as one.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+SIDES = ("left", "right")
+OTHER = "other"
+
+_SHORT = {"l": "left", "r": "right"}
+_NUMBER = re.compile(r"[-+]?\d+")
+# In the outline of a name: A is a capital, a another cased letter, c one without case, m a mark on
+# the letter before it, 0 a digit.
+_WORD = re.compile(r"(?:Am*)+(?![am])|(?:Am*)?(?:am*)+|[-+]?0+|(?:cm*)+")
+_KEPT = 2**13  # Names whose words are remembered
+
+# The first word of a name that begins like one of these decides the part of the face.
+_STEMS = {
+    "brows": ("brow", "eyebrow", "forehead"),
+    "eyes": ("eye", "lid", "gaze", "blink", "pupil"),
+    "nose": ("nose", "nostril"),
+    "cheeks": ("cheek",),
+    "mouth": ("mouth", "lip", "tongue", "teeth", "smile"),
+    "jaw": ("jaw", "chin"),
+    "head": ("head", "neck"),
+}
+PARTS = (*_STEMS, OTHER)
+"""Parts of the face, in a fixed order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word of a name: its text, folded, and where it stands in the composed name."""
+
+    text: str
+    begin: int
+    end: int
+
+
+def composed(name: str) -> str:
+    """The name with each letter and its accents as one character, where there is such (NFC)."""
+    return name if name.isascii() else unicodedata.normalize("NFC", name)
+
+
+@lru_cache(_KEPT)
+def parsed(name: str) -> tuple[Word, ...]:
+    """The words of a name, with their places in `composed`."""
+    name = composed(name)
+    spans = (found.span() for found in _WORD.finditer("".join(map(_outline, name))))
+    return tuple(Word(_same(name[begin:end]), begin, end) for begin, end in spans)
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of a name, case folded, numbers with their sign, ``l`` and ``r`` written out."""
+    return tuple(word.text for word in parsed(name))
+
+
+@lru_cache(_KEPT)
+def folded(name: str) -> str:
+    """The form that all spellings of a name share: its words, with a mark between two numbers.
+
+    >>> folded("EyeBlink_L"), folded("eye-blink-left"), folded("m1.12"), folded("m11.2")
+    ('eyeblinkleft', 'eyeblinkleft', 'm1_12', 'm11_2')
+    """
+    return joined(words(name)) or composed(name)
+
+
+def joined(found: Sequence[str]) -> str:
+    """The form that all spellings of a name share, from its words."""
+    parts = list(found[:1])
+    for before, word in zip(found, found[1:], strict=False):
+        parts += ["_", word] if is_number(before) and is_number(word) else [word]
+    return "".join(parts)
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number."""
+    return _NUMBER.fullmatch(word) is not None
+
+
+def part_of_face(name: str) -> str:
+    """The part of the face, one of `PARTS`, by the first word of a name that shows it."""
+    return next((part for word in words(name) if (part := part_of(word)) != OTHER), OTHER)
+
+
+def part_of(word: str) -> str:
+    """The part of the face that a word shows, one of `PARTS`."""
+    return next((part for part, stems in _STEMS.items() if word.startswith(stems)), OTHER)
+
+
+def _outline(sign: str) -> str:
+    if sign.isascii() and not sign.isalnum():
+        return sign if sign in "+-" else " "
+    if sign.isupper() or sign.istitle():
+        return "A"
+    if sign.islower():
+        return "a"
+    if sign.isdigit():
+        return "0"
+    return "c" if sign.isalnum() else "m" if unicodedata.category(sign)[0] == "M" else " "
+
+
+def _same(word: str) -> str:
+    """The word in one case, with characters of one meaning alike: full width, ligatures."""
+    if not word.isascii():
+        word = unicodedata.normalize("NFKC", word).casefold()
+    word = unicodedata.normalize("NFKC", word.casefold())
+    return _SHORT.get(word, word)
