@@ -18,37 +18,12 @@ _MOST_FACIAL = 0.5
 _MANY = 8
 """Names that share no word of their own: fewer may be all the corners, or all that opens."""
 _KINDS = frozenset(
-    [
-        "bs",
-        "blend",
-        "blendshape",
-        "blendshapes",
-        "bsnode",
-        "ctl",
-        "ctrl",
-        "control",
-        "controls",
-        "curve",
-        "expression",
-        "expressions",
-        "face",
-        "geo",
-        "geometry",
-        "grp",
-        "head",
-        "mesh",
-        "morph",
-        "morpher",
-        "node",
-        "rig",
-        "shape",
-        "shapes",
-        "target",
-        "targets",
-        "value",
-        "weight",
-        "weights",
-    ]
+    (
+        *("bs", "bsnode", "blend", "blendshape", "blendshapes", "ctl", "ctrl", "control"),
+        *("controls", "curve", "expression", "expressions", "face", "geo", "geometry", "grp"),
+        *("head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes", "target"),
+        *("targets", "value", "weight", "weights"),
+    )
 )
 _CARRIERS = ("head", "face")  # Of a mesh as of a part of the face
 

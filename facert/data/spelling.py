@@ -6,6 +6,7 @@ writes ``é`` as two characters, other systems as one.
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -46,8 +47,8 @@ class Word:
 
 
 def composed(name: str) -> str:
-    """The name with each letter and its accents as one character, where there is such (NFC)."""
-    return name if name.isascii() else unicodedata.normalize("NFC", name)
+    """The name in one form of Unicode, NFKC: accents are one with their letter, no full width."""
+    return name if name.isascii() else unicodedata.normalize("NFKC", name)
 
 
 @lru_cache(_KEPT)
@@ -76,7 +77,7 @@ def folded(name: str) -> str:
 def joined(found: Sequence[str]) -> str:
     """The form that all spellings of a name share, from its words."""
     parts = list(found[:1])
-    for before, word in zip(found, found[1:], strict=False):
+    for before, word in itertools.pairwise(found):
         parts += ["_", word] if is_number(before) and is_number(word) else [word]
     return "".join(parts)
 
@@ -109,8 +110,5 @@ def _outline(sign: str) -> str:
 
 
 def _same(word: str) -> str:
-    """The word in one case, with characters of one meaning alike: full width, ligatures."""
-    if not word.isascii():
-        word = unicodedata.normalize("NFKC", word).casefold()
-    word = unicodedata.normalize("NFKC", word.casefold())
+    word = composed(word.casefold())
     return _SHORT.get(word, word)
