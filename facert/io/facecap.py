@@ -11,6 +11,7 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
+from facert.data.clock import put_together
 from facert.data.names import canonical
 from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
@@ -40,7 +41,7 @@ def read_facecap(path: Path) -> Take:
         check_width(rows, header)
         columns = [_CLOCK, *range(_SHAPES, len(header))]
         values = to_numbers(rows, header, columns)
-        time = (values[:, 0] - values[0, 0]) / 1000.0
+        time = put_together((values[:, 0] - values[0, 0]) / 1000.0, values[:, 1:])
         log.info("the motion of head and eyes is left out")
         return Take(
             time=time,

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.clock import rising
 from facert.data.names import ARKIT_NAMES, canonical, match, nearest
 from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take, named_curves
@@ -65,13 +66,12 @@ def read_livelink(path: Path) -> Take:
         rows = _rows_with_face(rows)
         check_width(rows, header)
         ticks, count = _clock(rows)
-        kept = _rising(ticks)
-        values = to_numbers(rows, header, range(2, len(header)))[kept]
-        time = (ticks[kept] - ticks[0]) / TICKS
+        values = to_numbers(rows, header, range(2, len(header)))
+        kept, time = rising((ticks - ticks[0]) / TICKS, values)
         rate = nominal_rate(time)
         return Take(
             time=time,
-            source=Source(values, _canonical_columns(header[2:])),
+            source=Source(values[kept], _canonical_columns(header[2:])),
             fps=rate,
             start_timecode=_start(rows[0].cells[0].strip(), int(ticks[0]), count, rate),
         )
@@ -182,16 +182,6 @@ def _row_ticks(row: Line) -> int:
     if ticks is None:
         raise row.error(_LEADING[0], "HH:MM:SS:FF.mmm", repr(row.cells[0][:40]))
     return ticks
-
-
-def _rising(ticks: IntArray) -> IntArray:
-    """Indices of the rows that come after every row before them."""
-    latest_before = np.maximum.accumulate(ticks)[:-1]
-    kept = np.flatnonzero(np.append(True, ticks[1:] > latest_before))
-    if len(kept) < len(ticks):
-        dropped = plural(len(ticks) - len(kept), "row")
-        log.warning("dropped %s whose time does not rise", dropped)
-    return kept
 
 
 def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:

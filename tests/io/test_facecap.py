@@ -55,3 +55,11 @@ def test_what_is_wrong_is_named(path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
         read_facecap(path)
     assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_a_clock_that_is_set_back_goes_on(path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rows = [(40 * i - (2000 if i >= 30 else 0), i) for i in range(60)]
+    path.write_text(HEAD + "".join(f"k,{3000 + t},{POSE},{i},2,3\n" for t, i in rows))
+    take = read_facecap(path)
+    np.testing.assert_allclose(take.time, np.arange(60) / 25)
+    assert "back by 2 s at row 31" in caplog.text

@@ -267,3 +267,14 @@ def test_a_recording_that_a_spreadsheet_saved_with_semicolons_is_read(tmp_path):
     take = read_take_file(path)
     assert take.source.names == ("jawOpen",)
     np.testing.assert_array_equal(take.source.values[:, 0], [0.25, 0.5])
+
+
+@pytest.mark.parametrize("seconds", [3600, 2])
+def test_a_clock_that_is_set_back_goes_on(path, caplog, seconds):
+    ticks = 10_800_000 * 20 + 2000 * np.arange(180)
+    ticks[90:] -= seconds * 60_000
+    codes = [format_timecode(int(tick)) for tick in ticks]
+    write(path, ["jawOpen"], codes, [["1", row] for row in range(180)])
+    take = read_livelink(path)
+    np.testing.assert_allclose(take.time, np.arange(180) / 30, atol=1e-9)
+    assert f"the clock steps back by {seconds} s at row 91" in caplog.text
