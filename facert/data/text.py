@@ -10,3 +10,9 @@ def plural(count: int, noun: str, nouns: str = "") -> str:
     ('1 frame', '0 frames', '3 vertices')
     """
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def printable(text: str, most: int = 60) -> str:
+    """Foreign text for a line of the log: short, with escapes for what would upset a terminal."""
+    shown = text if len(text) <= most else f"{text[:most]}[...]"
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in shown)

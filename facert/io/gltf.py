@@ -2,7 +2,8 @@
 
 JSON describes arrays of numbers (accessors), where they lie in buffers (views), what they mean. All
 of it is foreign: offsets, counts and strides are compared with the bytes there are before an array
-is made. A buffer is in the file itself or in a file beside the document, never elsewhere.
+is made. A buffer is in the file itself or in a file beside the document, never elsewhere. Views may
+be compressed (``EXT_meshopt_compression``), numbers quantised (``KHR_mesh_quantization``).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import binascii
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError, reading
 from facert.io.curves import parse_json_object
+from facert.io.gltf_compression import MESHOPT, decompressed
 from facert.io.guarded import moderate_file, parsing
 
 MAX_VALUES = 2**27
@@ -31,7 +33,7 @@ MAX_VALUES = 2**27
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+_DRACO = "KHR_draco_mesh_compression"
 _EMBEDDED = ";base64,"
 
 
@@ -48,21 +50,22 @@ class Document:
 
     root: dict[str, Any]
     buffers: Sequence[bytes]
+    _unpacked: dict[int, bytes] = field(default_factory=dict)  # compressed views, by number
 
     def numbers(self, accessor: int) -> FloatArray:
         """An accessor's numbers (count, width) as float64; normalised integers are 0 to 1."""
         described = self.root["accessors"][_index(accessor)]
         values = self._values(described)
-        if not described.get("normalized", False):
+        if not described.get("normalized", False) or values.dtype.kind == "f":
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
     def integers(self, accessor: int) -> IntArray:
-        """An accessor's whole numbers, (count,)."""
+        """An accessor's whole numbers, (count, width)."""
         values = self._values(self.root["accessors"][_index(accessor)])
         if values.dtype.kind != "u":
             raise ValueError("indices that are no unsigned integers")
-        return values[:, 0].astype(np.int64)
+        return values.astype(np.int64)
 
     def _values(self, accessor: dict[str, Any]) -> NDArray[Any]:
         width, count = _WIDTHS[accessor["type"]], _index(accessor["count"])
@@ -83,15 +86,29 @@ class Document:
 
     def _view(self, place: dict[str, Any], dtype: str, count: int, width: int) -> NDArray[Any]:
         """Numbers that lie in a buffer, (count, width)."""
-        view = self.root["bufferViews"][_index(place["bufferView"])]
-        begin, offset = _index(view.get("byteOffset", 0)), _index(place.get("byteOffset", 0))
-        content = self.buffers[_index(view["buffer"])][begin : begin + _index(view["byteLength"])]
+        number, offset = _index(place["bufferView"]), _index(place.get("byteOffset", 0))
+        view, content = self.root["bufferViews"][number], self._content(number)
         size = np.dtype(dtype).itemsize
         stride = _index(view.get("byteStride", 0)) or width * size
         # Not left to NumPy, which takes an empty buffer to be as large as it needs to be.
         if count and offset + (count - 1) * stride + width * size > len(content):
             raise ValueError(f"{count} numbers in {len(content)} bytes")
         return np.ndarray((count, width), dtype, content, offset, (stride, size))
+
+    def _content(self, number: int) -> bytes:
+        """The bytes of a view, decompressed."""
+        view = self.root["bufferViews"][number]
+        packed = next(filter(None, map(view.get("extensions", {}).get, MESHOPT)), None)
+        if packed is None:
+            return self._bytes(view)
+        if number not in self._unpacked:
+            length = _index(view["byteLength"])
+            self._unpacked[number] = decompressed(packed, self._bytes(packed), length)
+        return self._unpacked[number]
+
+    def _bytes(self, place: dict[str, Any]) -> bytes:
+        begin = _index(place.get("byteOffset", 0))
+        return self.buffers[_index(place["buffer"])][begin : begin + _index(place["byteLength"])]
 
 
 @contextmanager
@@ -112,12 +129,11 @@ def _document(path: Path) -> Document:
     root = parse_json_object(text)
     if not str(root["asset"]["version"]).startswith("2"):
         raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
-    packed = sorted(set(_PACKED) & set(root.get("extensionsRequired", [])))
-    if packed:
-        fix = "Export it without compression."
-        raise InputError("extensionsRequired", "plain geometry", packed[0], fix)
+    if _DRACO in root.get("extensionsRequired", []):
+        fix = "Export it without Compression, or: npx gltf-pipeline -i IN.glb -o PLAIN.glb"
+        raise InputError("extensionsRequired", "no Draco compression", _DRACO, fix)
     buffers = enumerate(root.get("buffers", []))
-    return Document(root, [_buffer(one.get("uri"), path.parent, own, i) for i, one in buffers])
+    return Document(root, [_buffer(one, path.parent, own, i) for i, one in buffers])
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
@@ -134,10 +150,13 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
     return content[20 : 20 + length], rest[8 : 8 + size] if other == _BINARY else None
 
 
-def _buffer(uri: Any, folder: Path, own: bytes | None, number: int) -> bytes:
+def _buffer(buffer: dict[str, Any], folder: Path, own: bytes | None, number: int) -> bytes:
     """Bytes of a buffer, from the file's own chunk, the URI, or a file beside it."""
+    uri = buffer.get("uri")
     if uri is None and number == 0 and own is not None:
         return own
+    if uri is None and any(name in buffer.get("extensions", {}) for name in MESHOPT):
+        return b""  # for programs that cannot decompress: left out, as it may be
     if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:
         try:
             return base64.b64decode(uri.partition(_EMBEDDED)[2], validate=True)

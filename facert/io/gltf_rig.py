@@ -1,8 +1,8 @@
-"""Faces in glTF files: meshes with morph targets as a rig, or at rest.
+"""Faces in glTF files and VRM avatars: meshes with morph targets as a rig, or at rest.
 
 A character is often cut into several meshes (face, teeth, lashes) whose targets bear the same
-names: they become one rig, placed as the scene places them. The targets' names are in the
-``extras`` of the mesh. glTF counts in metres, and y is up.
+names: they become one rig, placed as the scene and its skeleton place them, with all weights at 0.
+glTF counts in metres, and y is up.
 """
 
 from __future__ import annotations
@@ -17,24 +17,30 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh, Rig
+from facert.data.text import printable
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
+from facert.io.gltf_names import target_names
+from facert.io.gltf_scene import Scene, displaced, mirrored, scene_of, transformed
+from facert.io.vrm import Bind, expressions_of
 
 log = logging.getLogger("facert")
 
 _TRIANGLES = 4
 _GAMMA = 2.2
 UNITS = "m"
+TARGETS, EXPRESSIONS = "targets", "expressions"
+"""What the shapes of a rig are: each morph target alone, or the expressions of a VRM avatar."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Primitive:
-    """Triangles in the document: their mesh, its entry of them, where the scene places them."""
+    """Triangles in the document: their node and mesh, their entry in it, and its targets."""
 
-    mesh: dict[str, Any]
+    node: int
+    mesh: int
     entry: dict[str, Any]
     targets: list[dict[str, Any]]
-    world: FloatArray  # (4, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +54,30 @@ class _PlacedMesh:
     colours: FloatArray | None
 
 
-def read_gltf_rig(path: Path) -> Rig:
+def read_gltf_rig(path: Path, shapes: str | None = None) -> Rig:
     """Read all meshes with morph targets as one rig, in metres.
 
     Targets of the same name belong together. Meshes without a target are left out. Exporters cut a
     vertex in several where texture or normals jump: those that share place and motion are one.
+    With `shapes` "expressions", the shapes are the expressions of a VRM avatar.
 
-    Raises `InputError` when the file cannot be read safely, or no mesh has morph targets.
+    Raises `InputError` when the file cannot be read safely, no mesh has morph targets, or there are
+    no such shapes.
     """
     with open_gltf(path) as document:
-        parts = [_part(document, one) for one in _primitives(document) if one.targets]
-        if not parts:
+        scene = scene_of(document)
+        there = [one for one in _primitives(scene) if one.targets]
+        if not there:
             raise InputError(
                 "meshes", "morph targets", "none", "Export the mesh with its shape keys."
             )
+        names = target_names(scene)
+        parts = [_part(scene, one, names[one.mesh]) for one in there]
+        _log_default_weights(document, there, names)
+        expressions = _expressions(document, shapes)
+        if shapes == EXPRESSIONS:
+            pairs = zip(parts, there, strict=True)
+            parts = [_expressed(part, one.mesh, expressions) for part, one in pairs]
         whole = _welded(_united(parts))
         return Rig(whole.vertices, whole.targets, whole.names, whole.faces, UNITS, whole.colours)
 
@@ -72,29 +88,29 @@ def read_gltf_mesh(path: Path) -> Mesh:
     Raises `InputError` when the file cannot be read safely, or has no triangles.
     """
     with open_gltf(path) as document:
-        there = list(_primitives(document))
+        scene = scene_of(document)
+        there = list(_primitives(scene))
         chosen = [one for one in there if one.targets] or there
         if not chosen:
             raise InputError("meshes", "triangles", "none", "Export the mesh as well.")
-        whole = _welded(_united([_part(document, one) for one in chosen]))
+        names = target_names(scene)
+        whole = _welded(_united([_part(scene, one, names.get(one.mesh, ())) for one in chosen]))
         return Mesh(whole.vertices, whole.faces, UNITS, whole.colours)
 
 
-def _primitives(document: Document) -> Iterator[_Primitive]:
+def _primitives(scene: Scene) -> Iterator[_Primitive]:
     """Iterate over the triangle primitives of the scene."""
-    for node, world in _placed_nodes(document.root):
+    for number in scene.nodes:
+        node = scene.document.root["nodes"][number]
         if "mesh" not in node:
             continue
-        mesh = document.root["meshes"][node["mesh"]]
-        # Of a skinned mesh the joints decide the place; in their rest pose it stays where it is.
-        placed = np.eye(4) if "skin" in node else world
-        for one in mesh["primitives"]:
+        for one in scene.document.root["meshes"][node["mesh"]]["primitives"]:
             if one.get("mode", _TRIANGLES) == _TRIANGLES:
-                yield _Primitive(mesh, one, one.get("targets", []), placed)
+                yield _Primitive(number, node["mesh"], one, one.get("targets", []))
 
 
-def _part(document: Document, one: _Primitive) -> _PlacedMesh:
-    attributes = one.entry["attributes"]
+def _part(scene: Scene, one: _Primitive, names: Sequence[str]) -> _PlacedMesh:
+    document, attributes = scene.document, one.entry["attributes"]
     vertices = _vectors(document, attributes["POSITION"])
     _require_moderate(len(one.targets), len(vertices))
     moved = np.zeros((len(one.targets), *vertices.shape))
@@ -103,15 +119,60 @@ def _part(document: Document, one: _Primitive) -> _PlacedMesh:
             moved[index] = _vectors(document, target["POSITION"])
     indices = np.arange(len(vertices))
     if "indices" in one.entry:
-        indices = document.integers(one.entry["indices"])
+        indices = document.integers(one.entry["indices"])[:, 0]
     colours = document.numbers(attributes["COLOR_0"])[:, :3] if "COLOR_0" in attributes else None
-    turn, place = one.world[:3, :3], one.world[:3, 3]
+    placement = scene.placement(one.node, attributes)
+    corners = indices.reshape(-1, 3)
     return _PlacedMesh(
-        vertices=vertices @ turn.T + place,
-        targets=moved @ turn.T,
-        names=target_names(one.mesh, len(one.targets)) if one.targets else (),
-        faces=indices.reshape(-1, 3),
+        vertices=transformed(vertices, placement),
+        targets=displaced(moved, placement),
+        names=tuple(names[: len(one.targets)]),
+        faces=corners[:, ::-1] if mirrored(placement) else corners,
         colours=colours,
+    )
+
+
+def _log_default_weights(
+    document: Document, there: Sequence[_Primitive], names: dict[int, tuple[str, ...]]
+) -> None:
+    """Log the weights that the file shows its meshes with, as the neutral is without them."""
+    shown: dict[str, float] = {}
+    for one in there:
+        mesh, node = document.root["meshes"][one.mesh], document.root["nodes"][one.node]
+        weights = node.get("weights", mesh.get("weights", []))
+        shown |= {name: w for name, w in zip(names[one.mesh], weights, strict=False) if w}
+    if shown:
+        listed = ", ".join(f"{printable(name)} {weight:g}" for name, weight in shown.items())
+        log.info("the file shows the mesh with %s: the neutral is without", printable(listed, 200))
+
+
+def _expressions(document: Document, shapes: str | None) -> dict[str, list[Bind]]:
+    """The expressions of an avatar, which the log lists.
+
+    Raises `InputError` when `shapes` are none of what there is.
+    """
+    found = expressions_of(document.root)
+    choice = (TARGETS, EXPRESSIONS) if found else (TARGETS,)
+    if shapes is not None and shapes not in choice:
+        expected, fix = f"one of: {', '.join(choice)}", "Choose with --shapes, or leave it out."
+        raise InputError("--shapes", expected, repr(shapes), fix)
+    if found:
+        other = TARGETS if shapes == EXPRESSIONS else EXPRESSIONS
+        listed = printable(", ".join(found), 600)
+        log.info("expressions: %s; --shapes %s for a rig of those instead", listed, other)
+    return found
+
+
+def _expressed(part: _PlacedMesh, mesh: int, expressions: dict[str, list[Bind]]) -> _PlacedMesh:
+    """The part with expressions for targets: sums of those that they set."""
+    _require_moderate(len(expressions), len(part.vertices))
+    weights = np.zeros((len(expressions), len(part.targets)))
+    for row, binds in zip(weights, expressions.values(), strict=True):
+        for bind in binds:
+            if bind.mesh == mesh:
+                row[bind.target] += bind.weight
+    return replace(
+        part, targets=np.tensordot(weights, part.targets, axes=1), names=tuple(expressions)
     )
 
 
@@ -165,49 +226,9 @@ def _vectors(document: Document, accessor: int) -> FloatArray:
     return vectors
 
 
-def target_names(mesh: dict[str, Any], count: int) -> tuple[str, ...]:
-    """The names of a mesh's morph targets, all different; numbers where the file has none."""
-    names = mesh.get("extras", {}).get("targetNames")
-    if names is None:
-        log.warning("the morph targets have no names: they are called target1, target2, ...")
-        return tuple(f"target{index}" for index in range(1, count + 1))
-    if len(names) != count or len(set(names)) != count:
-        raise ValueError(f"{len(set(names))} names for {count} morph targets")
-    return tuple(str(name) for name in names)
-
-
 def _colours(parts: Sequence[_PlacedMesh]) -> FloatArray | None:
     """Colours (V, 3) as a screen shows them, if all parts have some; glTF's are linear light."""
     colours = [part.colours for part in parts if part.colours is not None]
     if len(colours) < len(parts):
         return None
     return np.asarray(np.clip(np.concatenate(colours), 0, 1) ** (1 / _GAMMA))
-
-
-def _placed_nodes(root: dict[str, Any]) -> Iterator[tuple[dict[str, Any], FloatArray]]:
-    """The nodes of the scene with their transforms to the world, (4, 4), each node once."""
-    nodes = root["nodes"]
-    scenes = root.get("scenes") or [{"nodes": list(range(len(nodes)))}]
-    waiting = [(index, np.eye(4)) for index in reversed(scenes[root.get("scene", 0)]["nodes"])]
-    seen: set[int] = set()
-    while waiting:
-        index, above = waiting.pop()
-        if index in seen:
-            continue
-        seen.add(index)
-        world = above @ _local(nodes[index])
-        yield nodes[index], world
-        waiting += [(child, world) for child in reversed(nodes[index].get("children", []))]
-
-
-def _local(node: dict[str, Any]) -> FloatArray:
-    """A node's own transform, (4, 4)."""
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    from scipy.spatial.transform import Rotation  # takes its time
-
-    local = np.eye(4)
-    turn = Rotation.from_quat(node.get("rotation", [0.0, 0.0, 0.0, 1.0])).as_matrix()
-    local[:3, :3] = turn * np.array(node.get("scale", [1.0] * 3), dtype=np.float64)
-    local[:3, 3] = node.get("translation", [0.0] * 3)
-    return local

@@ -14,7 +14,8 @@ from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
-from facert.io.gltf_rig import target_names
+from facert.io.gltf_names import target_names
+from facert.io.gltf_scene import scene_of
 from facert.io.registry import Kind
 
 log = logging.getLogger("facert")
@@ -80,20 +81,26 @@ def _chosen(document: Document, asked: str | None) -> list[_Curves]:
         wanted = "Choose with --target." if found else "Export the animation as well."
         raise InputError("animations", there, "none" if not found else "no choice", wanted)
     animation = found[names.index(asked)] if asked is not None else found[0]
-    return [_curves(document, animation, channel) for channel in _channels(animation)]
+    known = target_names(scene_of(document))
+    return [_curves(document, animation, channel, known) for channel in _channels(animation)]
 
 
-def _curves(document: Document, animation: dict[str, Any], channel: dict[str, Any]) -> _Curves:
+def _curves(
+    document: Document,
+    animation: dict[str, Any],
+    channel: dict[str, Any],
+    known: dict[int, tuple[str, ...]],
+) -> _Curves:
     sampler = animation["samplers"][channel["sampler"]]
-    mesh = document.root["meshes"][document.root["nodes"][channel["target"]["node"]]["mesh"]]
-    count = len(mesh["primitives"][0]["targets"])
+    names = known[document.root["nodes"][channel["target"]["node"]]["mesh"]]
+    count = len(names)
     time = document.numbers(sampler["input"])[:, 0]
     if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise ValueError("keys whose time does not rise")
     interpolation = sampler.get("interpolation", "LINEAR")
     values = document.numbers(sampler["output"])
     shape = (len(time), 3, count) if interpolation == "CUBICSPLINE" else (len(time), count)
-    return _Curves(time, values.reshape(shape), target_names(mesh, count), interpolation)
+    return _Curves(time, values.reshape(shape), names, interpolation)
 
 
 def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:

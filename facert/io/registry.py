@@ -98,7 +98,14 @@ FORMATS = (
             "mesh": "gltf_rig.read_gltf_mesh",
         },
         kind_of="gltf_take.kind_of",
-        reads="a rig of morph targets; their animation as a take",
+        reads="a rig of morph targets, at rest as the scene and its skeleton place it; their "
+        "animation as a take",
+    ),
+    Format(
+        (".vrm",),
+        read={"take": "gltf_take.read_gltf_take", "rig": "gltf_rig.read_gltf_rig"},
+        kind_of="gltf_take.kind_of",
+        reads="the same of a VRM avatar; with `--shapes expressions` its expressions",
     ),
     Format(
         (".glb",),

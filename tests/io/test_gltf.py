@@ -6,11 +6,11 @@ import base64
 import json
 import logging
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pygltflib as gltf
 import pytest
+from gltf_files import Builder
 
 from facert.data.labelling import weights_as_poses
 from facert.data.rig import Rig
@@ -38,64 +38,6 @@ FACE = Rig(
 )
 WEIGHTS = RNG.random((7, 3))
 TIME = np.arange(7) / 25
-
-
-class Builder:
-    """A document in the making, by pygltflib: one node with one mesh a call."""
-
-    def __init__(self) -> None:
-        self.document = gltf.GLTF2(scene=0, scenes=[gltf.Scene(nodes=[])])
-        self.content = b""
-
-    def view(self, array: np.ndarray, stride: int | None = None) -> int:
-        content = array.tobytes()
-        place = gltf.BufferView(
-            buffer=0, byteOffset=len(self.content), byteLength=len(content), byteStride=stride
-        )
-        self.document.bufferViews.append(place)
-        self.content += content + b"\0" * (-len(content) % 4)
-        return len(self.document.bufferViews) - 1
-
-    def accessor(self, array: np.ndarray, **others: Any) -> int:
-        codes = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121, "i2": 5122}
-        one = gltf.Accessor(
-            componentType=codes[array.dtype.str[1:]],
-            count=len(array),
-            type={1: "SCALAR", 3: "VEC3"}[1 if array.ndim == 1 else array.shape[1]],
-            **({"bufferView": self.view(array)} | others),
-        )
-        self.document.accessors.append(one)
-        return len(self.document.accessors) - 1
-
-    def mesh(self, vertices: np.ndarray, targets: dict[str, np.ndarray | int], **node: Any) -> None:
-        given = [one if isinstance(one, int) else self.accessor(one) for one in targets.values()]
-        primitive = gltf.Primitive(
-            attributes=gltf.Attributes(POSITION=self.accessor(vertices)),
-            targets=[{"POSITION": one} for one in given],
-        )
-        self.document.meshes.append(
-            gltf.Mesh(primitives=[primitive], extras={"targetNames": list(targets)})
-        )
-        self.document.nodes.append(gltf.Node(mesh=len(self.document.meshes) - 1, **node))
-        self.document.scenes[0].nodes.append(len(self.document.nodes) - 1)
-
-    def animate(
-        self, time: np.ndarray, output: np.ndarray, interpolation: str = "LINEAR", node: int = 0
-    ) -> None:
-        sampler = gltf.AnimationSampler(
-            input=self.accessor(np.float32(time)),
-            output=self.accessor(np.float32(output).ravel()),
-            interpolation=interpolation,
-        )
-        target = gltf.AnimationChannelTarget(node=node, path="weights")
-        channel = gltf.AnimationChannel(sampler=0, target=target)
-        self.document.animations.append(gltf.Animation(samplers=[sampler], channels=[channel]))
-
-    def save(self, path: Path) -> Path:
-        self.document.buffers = [gltf.Buffer(byteLength=len(self.content))]
-        self.document.set_binary_blob(self.content)
-        self.document.save(str(path))
-        return path
 
 
 @pytest.fixture(name="builder")

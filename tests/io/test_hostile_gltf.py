@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import struct
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from gltf_files import glb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,17 +19,6 @@ from facert.io.gltf_rig import read_gltf_rig
 from facert.io.gltf_take import read_gltf_take
 
 BLENDER = Path(__file__).parent / "files" / "blender.glb"  # made and exported in Blender 5.0
-
-
-def glb(root: dict[str, Any], content: bytes) -> bytes:
-    text = json.dumps(root).encode()
-    text += b" " * (-len(text) % 4)
-    total = 28 + len(text) + len(content)
-    return (
-        struct.pack("<III", 0x46546C67, 2, total)
-        + struct.pack("<II", len(text), 0x4E4F534A) + text
-        + struct.pack("<II", len(content), 0x004E4942) + content
-    )  # fmt: skip
 
 
 def rewritten(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:

@@ -1,0 +1,65 @@
+"""Expressions of VRM avatars, which are GLB files: sums of morph targets under a name.
+
+VRM 0 has them in ``extensions.VRM.blendShapeMaster.blendShapeGroups``, each with ``binds`` of a
+mesh, the index of a target, and a weight from 0 to 100. VRM 1 has them in
+``extensions.VRMC_vrm.expressions``, presets and custom ones, each with ``morphTargetBinds`` of a
+node, an index, and a weight from 0 to 1. What they do to materials is left aside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+_FULL = 100.0
+_UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Bind:
+    """A morph target that an expression sets: of a mesh, its index, and its weight."""
+
+    mesh: int
+    target: int
+    weight: float
+
+
+def expressions_of(root: dict[str, Any]) -> dict[str, list[Bind]]:
+    """The expressions of an avatar that move its mesh, by name; none of another glTF file."""
+    extensions = root.get("extensions", {})
+    if "VRMC_vrm" in extensions:
+        found = _of_version_1(root, extensions["VRMC_vrm"])
+    else:
+        found = _of_version_0(extensions.get("VRM", {}))
+    expressions: dict[str, list[Bind]] = {}
+    for name, binds in found:
+        if binds:
+            expressions.setdefault(name, binds)
+    return expressions
+
+
+def names_of_single_targets(root: dict[str, Any], mesh: int) -> dict[int, str]:
+    """Names of a mesh's targets, by index, that are each the whole of an expression."""
+    single = {name: b[0] for name, b in expressions_of(root).items() if len(b) == 1}
+    return {b.target: name for name, b in single.items() if b.mesh == mesh and b.weight == 1.0}
+
+
+def _of_version_0(vrm: dict[str, Any]) -> Iterator[tuple[str, list[Bind]]]:
+    for group in vrm.get("blendShapeMaster", {}).get("blendShapeGroups", []):
+        preset = str(group.get("presetName") or _UNKNOWN)
+        name = str(group.get("name") or preset) if preset == _UNKNOWN else preset
+        binds = group.get("binds") or []
+        yield name, [Bind(b["mesh"], b["index"], float(b["weight"]) / _FULL) for b in binds]
+
+
+def _of_version_1(root: dict[str, Any], vrm: dict[str, Any]) -> Iterator[tuple[str, list[Bind]]]:
+    kinds = vrm.get("expressions", {})
+    for kind in ("preset", "custom"):
+        for name, expression in (kinds.get(kind) or {}).items():
+            binds = expression.get("morphTargetBinds") or []
+            yield name, [_bind(root, bind) for bind in binds]
+
+
+def _bind(root: dict[str, Any], bind: dict[str, Any]) -> Bind:
+    return Bind(root["nodes"][bind["node"]]["mesh"], bind["index"], float(bind["weight"]))
