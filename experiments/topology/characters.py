@@ -172,7 +172,7 @@ def farthest_points(vertices: FloatArray, count: int, given: IntArray | None = N
 
 def _shared(names: tuple[str, ...], others: tuple[str, ...]) -> tuple[list[int], list[int]]:
     """The indices of the names that both lists have, in any spelling."""
-    index = NameIndex(others)
+    index = NameIndex.among(others, names, "the names of the others", quiet=True)
     found = [(one, index.find(name)) for one, name in enumerate(names)]
     both = [(one, other) for one, other in found if other is not None]
     return [one for one, _ in both], [other for _, other in both]

@@ -6,25 +6,30 @@ programs put the name of a scene, a subject, a node or a rig before a name, and 
 
 from __future__ import annotations
 
-import itertools
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from facert.data.spelling import OTHER, SIDES, composed, is_number, parsed, part_of, part_of_face
+from facert.data.spelling import (
+    OTHER,
+    SIDES,
+    composed,
+    is_number,
+    parsed,
+    part_of,
+    part_of_face,
+    words,
+)
 
 _STRONG = ":|/\\"
 """What parts a namespace or a path from a name, and no two words of a name."""
 _MOST_FACIAL = 0.5
 _MANY = 8
 """Names that share no word of their own: fewer may be all the corners, or all that opens."""
-_KINDS = frozenset(
-    (
-        *("bs", "bsnode", "blend", "blendshape", "blendshapes", "ctl", "ctrl", "control"),
-        *("controls", "curve", "expression", "expressions", "face", "geo", "geometry", "grp"),
-        *("head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes", "target"),
-        *("targets", "value", "weight", "weights"),
-    )
-)
+_KINDS = {"bs", "bsnode", "blend", "blendshape", "blendshapes", "ctl", "ctrl", "control"}
+_KINDS |= {"controls", "curve", "expression", "expressions", "face", "geo", "geometry", "grp"}
+_KINDS |= {"head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes", "target"}
+_KINDS |= {"targets", "value", "weight", "weights"}
 _CARRIERS = ("head", "face")  # Of a mesh as of a part of the face
 
 
@@ -40,8 +45,23 @@ class Affix:
         """The words of it."""
         return self.before + self.after
 
+    @property
+    def is_kind(self) -> bool:
+        """Whether it means a kind of node, or counts them, as far as its words are known."""
+        return all(word in _KINDS or is_number(word) for word in self.words)
+
     def core(self, name: str) -> str | None:
         """The name without it; None where the name has it not, or nothing else."""
+        span = self._span(name)
+        return None if span is None else composed(name)[span]
+
+    def spelled(self, name: str) -> tuple[str, str]:
+        """How a name that has it spells it: what the name begins with, and what it ends with."""
+        span = self._span(name)
+        assert span is not None  # it has it
+        return composed(name)[: span.start], composed(name)[span.stop :]
+
+    def _span(self, name: str) -> slice | None:
         found = parsed(name)
         texts = tuple(word.text for word in found)
         end = len(found) - len(self.after)
@@ -49,8 +69,10 @@ class Affix:
             return None
         if texts[: len(self.before)] != self.before or texts[end:] != self.after:
             return None
-        own = found[len(self.before) : end]
-        return composed(name)[own[0].begin : own[-1].end]
+        return slice(found[len(self.before)].begin, found[end - 1].end)
+
+
+NONE = Affix()
 
 
 def without_affix(names: Sequence[str]) -> tuple[str, ...]:
@@ -72,19 +94,13 @@ def without_affix(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def shared_affixes(names: Sequence[str]) -> list[Affix]:
-    """All that every name of a list begins and ends with, the longest first."""
-    texts = [tuple(word.text for word in parsed(name)) for name in names]
-    if not texts:
-        return []
-    before, after = _alike(texts), _alike([one[::-1] for one in texts])[::-1]
-    found = [
-        Affix(before[:first], after[len(after) - last :])
-        for first in range(len(before) + 1)
-        for last in range(len(after) + 1)
-        if first + last
-    ]
-    return sorted(found, key=lambda affix: -len(affix.words))
+def shared_affixes(names: Sequence[str], share: float = 1.0) -> list[Affix]:
+    """All that at least so many of the names begin and end with, the longest first."""
+    texts = [words(name) for name in names]
+    befores = _common(texts, share)
+    afters = [after[::-1] for after in _common([one[::-1] for one in texts], share)]
+    found = [Affix(before, after) for before in befores for after in afters]
+    return sorted(filter(lambda affix: affix.words, found), key=lambda affix: -len(affix.words))
 
 
 def cores_of(affix: Affix, names: Sequence[str]) -> tuple[str, ...] | None:
@@ -98,7 +114,7 @@ def is_clear(affix: Affix, names: Sequence[str], cores: Sequence[str]) -> bool:
     if not affix.after and all(is_namespace(affix, name) for name in names):
         return True
     facial = sum(part_of_face(core) != OTHER for core in cores)
-    sure = len(names) >= _MANY or all(word in _KINDS or is_number(word) for word in affix.words)
+    sure = len(names) >= _MANY or affix.is_kind
     return sure and is_foreign(affix) and facial > _MOST_FACIAL * len(cores)
 
 
@@ -119,8 +135,16 @@ def is_foreign(affix: Affix) -> bool:
     )
 
 
-def _alike(texts: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """The words that all begin with."""
-    least, most = min(texts), max(texts)  # the two that differ first
-    pairs = zip(least, most, strict=False)
-    return tuple(one for one, _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
+def _common(texts: Sequence[tuple[str, ...]], share: float) -> list[tuple[str, ...]]:
+    """What at least so many, above a half, begin with: nothing, and each time a word more."""
+    found: list[tuple[str, ...]] = [()]
+    having = list(texts)
+    while having:
+        size = len(found[-1]) + 1
+        longer = Counter(one[:size] for one in having if len(one) >= size)
+        best, count = max(longer.items(), key=lambda item: item[1], default=((), 0))
+        if not count or count < share * len(texts):
+            break
+        found.append(best)
+        having = [one for one in having if one[:size] == best]
+    return found

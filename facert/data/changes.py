@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from facert.data.labelling import Poses, labelled
 from facert.data.names import NameIndex, nearest
 from facert.data.resampling import resampled
 from facert.data.rig import Rig
+from facert.data.spelling import composed, contrasted
 from facert.data.take import Controls, Take
 from facert.data.timecode import timecode
 from facert.data.units import with_units, with_up_axis
@@ -89,8 +92,9 @@ def _in_time(take: Take, changes: Changes) -> Take:
 def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
     """A take or rig with its names replaced.
 
-    `names` goes from those in the file, in any spelling, to the new ones. Of a take the markers or
-    weights and the controls are renamed. What is not in the mapping keeps its name.
+    `names` goes from those in the file, in any spelling, to the new ones; ``"Face:*"`` to ``"*"``
+    removes a prefix from all that have it. Of a take the markers or weights and the controls are
+    renamed. What is not in the mapping keeps its name.
 
     Raises `InputError` for a name that the file does not have, with the nearest one that it has,
     and for two that would bear one name.
@@ -99,33 +103,60 @@ def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
         if not isinstance(ours, str):
             expected = 'a name, as in theirs = "ours"'
             raise InputError(theirs, expected, repr(ours), "Correct the map.")
+    new = {theirs: str(ours) for theirs, ours in names.items()}
     if isinstance(found, Rig):
-        _require_known(names, found.names)
-        return replace(found, names=_renamed(found.names, names))
+        (shapes,) = _renamed([found.names], new)
+        return replace(found, names=shapes)
     controls = found.controls
-    _require_known(names, (*found.source.names, *(controls.names if controls else ())))
-    source = replace(found.source, names=_renamed(found.source.names, names))
+    lists = [found.source.names, controls.names if controls else ()]
+    source_names, control_names = _renamed(lists, new)
+    source = replace(found.source, names=source_names)
     if controls is not None:
-        controls = Controls(_renamed(controls.names, names), controls.limits)
+        controls = Controls(control_names, controls.limits)
     return replace(found, source=source, controls=controls)
 
 
-def _require_known(names: Iterable[str], there: Sequence[str]) -> None:
-    """Refuse a name that is nowhere in the file."""
-    index = NameIndex(tuple(dict.fromkeys(there)))
-    unknown = [name for name in names if index.find(name) is None]
+def _renamed(lists: Sequence[tuple[str, ...]], names: Mapping[str, str]) -> list[tuple[str, ...]]:
+    """Lists of names with those in a mapping replaced; all of it must be in one of them."""
+    there = tuple(dict.fromkeys(chain(*lists)))
+    patterns = {key for key in names if "*" in key and key not in there}
+    plain = {theirs: ours for theirs, ours in names.items() if theirs not in patterns}
+    fitting = _fitting({pattern: names[pattern] for pattern in patterns}, there)
+    index = NameIndex.among(there, list(plain), "--map")
+    _require_known([name for name in plain if index.find(name) is None], there)
+    result = []
+    for present in lists:
+        new = [fitting.get(name, name) for name in present]
+        index = NameIndex.among(present, list(plain), "--map", quiet=True)
+        for theirs, ours in plain.items():
+            place = index.find(theirs)
+            if place is not None:
+                new[place] = ours
+        result.append(tuple(new))
+    return result
+
+
+def _require_known(unknown: Sequence[str], there: Sequence[str]) -> None:
+    """Refuse names that are nowhere in the file."""
     if unknown:
         near = nearest(unknown[0], there)
         more = f" ({len(unknown) - 1} more)" if len(unknown) > 1 else ""
         expected = f"names in the file, such as {near or there[0]!r}"
-        fix = f"Did you mean {near!r}?" if near else "Correct the map."
+        fix = f"Did you mean {contrasted(near, unknown[0])}?" if near else "Correct the map."
         raise InputError("--map", expected, f"{unknown[0]!r}{more}", fix)
 
 
-def _renamed(present: Sequence[str], names: Mapping[str, object]) -> tuple[str, ...]:
-    index, result = NameIndex(present), list(present)
-    for theirs, ours in names.items():
-        place = index.find(theirs)
-        if place is not None:
-            result[place] = str(ours)
-    return tuple(result)
+def _fitting(patterns: Mapping[str, str], there: Sequence[str]) -> dict[str, str]:
+    """The new names of those that fit a pattern: what its * stands for is kept."""
+    new: dict[str, str] = {}
+    for pattern, ours in patterns.items():
+        if pattern.count("*") != 1 or ours.count("*") != 1:
+            expected = 'one * on either side, as in "Face:*" = "*"'
+            raise InputError("--map", expected, f"{pattern!r} = {ours!r}", "Correct the map.")
+        before, after = map(composed, pattern.split("*"))
+        kept = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
+        matches = {name: kept.fullmatch(composed(name)) for name in there}
+        found = {name: ours.replace("*", one[1]) for name, one in matches.items() if one}
+        _require_known([] if found else [pattern], there)
+        new |= found
+    return new

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray, checked_names
-from facert.data.names import match, shape_drivers
+from facert.data.names import NameIndex, match
 from facert.data.resampling import nearest_frames
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take, named_curves
@@ -132,7 +132,8 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
     as a whole.
     """
     poses = poses_of(take)
-    kept = [i for i, name in enumerate(poses.names) if _has_shape(name, rig)]
+    index = NameIndex.among(rig.names, poses.names, "/source/names", halves=True)
+    kept = [i for i, name in enumerate(poses.names) if index.find_halves(name)]
     if not kept:
         found = f"{poses.names[0]!r} and others"
         raise InputError("/source/names", "names of the rig's shapes", found, "Give another rig.")
@@ -148,14 +149,6 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
     controls = Controls(tuple(poses.names[i] for i in kept))
     params = np.where(whole[:, None], values, np.nan)
     return replace(take, controls=controls, params=params, std=None, animation=None)
-
-
-def _has_shape(name: str, rig: Rig) -> bool:
-    try:
-        shape_drivers([name], rig.names)
-    except InputError:
-        return False
-    return True
 
 
 def predicted_poses(take: Take) -> int:

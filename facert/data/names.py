@@ -8,15 +8,28 @@ the separators and the way to write the side.
 from __future__ import annotations
 
 import difflib
+import logging
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
 
+from facert.data.affixes import NONE, without_affix
+from facert.data.alignment import NEARLY, Alignment, find_alignment
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.spelling import PARTS, SIDES, folded, part_of_face, words
+from facert.data.spelling import (
+    PARTS,
+    SIDES,
+    composed,
+    contrasted,
+    folded,
+    part_of_face,
+    words,
+)
 from facert.errors import InputError
+
+log = logging.getLogger(__name__)
 
 _SHAPES = """
     eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft
@@ -55,69 +68,175 @@ def canonical(name: str) -> str:
 
 
 def nearest(name: str, candidates: Sequence[str]) -> str | None:
-    """The candidate that is spelled most like `name`, or None when none comes near."""
-    spelled = {folded(candidate): candidate for candidate in candidates}
-    found = difflib.get_close_matches(folded(name), spelled, n=1, cutoff=0.7)
-    return spelled[found[0]] if found else None
+    """The candidate that is spelled most like `name`, or None when none comes near.
+
+    Where none does as it is, the one that does without what all candidates share.
+    """
+    (own,) = without_affix([name])
+    for sought, cores in ((name, candidates), (own, without_affix(candidates))):
+        spelled = {folded(core): one for core, one in zip(cores, candidates, strict=True)}
+        found = difflib.get_close_matches(folded(sought), spelled, n=1, cutoff=0.7)
+        if found:
+            return spelled[found[0]]
+    return None
+
+
+class _Spellings:
+    """Positions by name: as it is spelled, in any form of Unicode, or else in any spelling."""
+
+    def __init__(self, names: Mapping[int, str]) -> None:
+        self._exact = {name: place for place, name in names.items()}
+        self._others = [(form, _different(form, names)) for form in (composed, folded)]
+
+    def find(self, name: str) -> int | None:
+        if name in self._exact:
+            return self._exact[name]
+        found = (places.get(form(name)) for form, places in self._others)
+        return next((place for place in found if place is not None), None)
+
+
+def _different(form: Callable[[str], str], names: Mapping[int, str]) -> dict[str, int]:
+    """Positions by a form of the names, without those that have it in common."""
+    count = Counter(map(form, names.values()))
+    return {key: place for place, name in names.items() if count[key := form(name)] == 1}
 
 
 class NameIndex:
     """Index of names, all different, in a list, whatever their spelling.
 
     A name is found as it is spelled, or else by the one other spelling of it in the list.
+
+    Parameters
+    ----------
+    names : sequence of str
+    aligned : Alignment, optional
+        What to see through in these names, and in those that are looked up; see `among`.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        spellings = [folded(name) for name in names]
-        count = Counter(spellings)
-        self._folded = {key: i for i, key in enumerate(spellings) if count[key] == 1}
-        self._exact = {name: i for i, name in enumerate(names)}
+    def __init__(self, names: Sequence[str], aligned: Alignment | None = None) -> None:
+        self._names = names
+        self._whole = _Spellings(dict(enumerate(names)))
+        self._aligned = aligned
+        removed = NONE if aligned is None else aligned.of_among
+        cores = {place: removed.core(name) for place, name in enumerate(names) if aligned}
+        self._cores = _Spellings({place: core for place, core in cores.items() if core})
+
+    @classmethod
+    def among(
+        cls,
+        names: Sequence[str],
+        wanted: Sequence[str],
+        field: str,
+        *,
+        halves: bool = False,
+        quiet: bool = False,
+    ) -> NameIndex:
+        """Index of names in which the wanted ones, as a list, are to be found.
+
+        Where most are not found as they are, a prefix or a suffix of either list is seen through
+        if nearly all match without it; the log names it. With `halves`, a wanted name may be the
+        whole of a left and a right one.
+
+        Raises `InputError` naming `field`, what holds `names`, when they are those of two subjects.
+        """
+        plain = cls(names)
+        look = plain.find_halves if halves else plain.find
+        found = sum(look(name) not in (None, []) for name in wanted)
+        if found >= NEARLY * min(len(wanted), len(names)):
+            return plain
+        aligned = find_alignment(wanted, names, field, halves)
+        if aligned is None or len(aligned.pairs) <= found:
+            return plain
+        if not quiet:
+            log.info("%s", aligned.text(wanted, names))
+        return cls(names, aligned)
 
     def find(self, name: str) -> int | None:
         """The position of `name`, or None."""
-        return self._exact.get(name, self._folded.get(folded(name)))
+        found = (spellings.find(one) for spellings, one in self._readings(name))
+        return next((place for place in found if place is not None), None)
 
     def find_halves(self, name: str) -> list[int]:
         """The position of `name`, or else those of its left and right half; empty without both."""
         whole = self.find(name)
         if whole is not None:
             return [whole]
-        halves = [self.find(f"{name}_{side}") for side in "LR"]
-        return [half for half in halves if half is not None] if None not in halves else []
+        for spellings, one in self._readings(name):
+            halves = [spellings.find(f"{one}_{side}") for side in "LR"]
+            if None not in halves:
+                return [half for half in halves if half is not None]
+        return []
+
+    def find_whole(self, name: str) -> int | None:
+        """The position of `name`, or else of the whole that it is the left or the right half of."""
+        whole = self.find(name)
+        if whole is not None:
+            return whole
+        found = (
+            spellings.find(folded(one).removesuffix("left").removesuffix("right"))
+            for spellings, one in self._readings(name)
+        )
+        return next((place for place in found if place is not None), None)
+
+    def _readings(self, name: str) -> Iterator[tuple[_Spellings, str]]:
+        """A name as it is to be looked up, and where: at first without what is seen through."""
+        core = None if self._aligned is None else self._aligned.of_wanted.core(name)
+        if core is not None:
+            yield self._cores, core
+        yield self._whole, name
+
+    def places(self, wanted: Sequence[str], field: str) -> IntArray:
+        """Indices of each wanted name, (P,); raises what `match` does."""
+        positions = [self.find(name) for name in wanted]
+        if None in positions:
+            lost = [name for name, place in zip(wanted, positions, strict=True) if place is None]
+            raise _lost(lost, self._names, field)
+        found = np.array(positions, dtype=np.int64)
+        _require_different(found, wanted, self._names, field)
+        return found
 
 
 def match(wanted: Sequence[str], among: Sequence[str], field: str) -> IntArray:
     """Indices into `among` of each wanted name, in any spelling, (P,).
 
+    A prefix or suffix of either list is seen through, see `NameIndex.among`.
+
     Raises `InputError` naming `field`, what holds `among`: for the first name that is not there,
-    with the nearest one that is; for two names that would stand at one place.
+    with the nearest one that is; for two names that would stand at one place; for two subjects.
     """
-    index = NameIndex(among)
-    positions = [index.find(name) for name in wanted]
-    if None in positions:
-        lost = wanted[positions.index(None)]
-        near = nearest(lost, among)
-        found = f"no such name among {len(among)}"
-        fix = "Rename it in one of the files."
-        more = positions.count(None) - 1
-        also = f" (and {more} more)" if more else ""
-        hint = f"Did you mean {near!r}? {fix}" if near else fix
-        raise InputError(field, f"the name {lost!r}{also}", found, hint)
-    places = np.array(positions, dtype=np.int64)
-    _require_different(places, wanted, among, field)
-    return places
+    return NameIndex.among(among, wanted, field).places(wanted, field)
+
+
+def _lost(names: Sequence[str], among: Sequence[str], field: str) -> InputError:
+    """An error for names that are not there, with the nearest to the first one."""
+    near = nearest(names[0], among)
+    more = len(names) - 1
+    also = f" (and {more} more)" if more else ""
+    example = f", such as {among[0]!r}" if among and not near else ""
+    fix = "Rename it in one of the files."
+    hint = f"Did you mean {contrasted(near, names[0])}? {fix}" if near else fix
+    return InputError(
+        field, f"the name {names[0]!r}{also}", f"no such name among {len(among)}{example}", hint
+    )
 
 
 def fitting(pattern: str, names: Sequence[str]) -> list[int]:
     """Indices of the names that match a name in any spelling, or with wildcards.
 
+    What all names share is seen through.
+
     >>> fitting("eyeBlink*", ["jawOpen", "eyeBlink_L"]), fitting("JawOpen", ["jawOpen", "jaw*"])
     ([1], [0])
     """
-    if pattern not in names and any(wildcard in pattern for wildcard in "*?["):
-        return [index for index, name in enumerate(names) if fnmatchcase(name, pattern)]
-    place = NameIndex(names).find(pattern)
-    return [] if place is None else [place]
+    if pattern in names or not any(wildcard in pattern for wildcard in "*?["):
+        place = NameIndex.among(names, [pattern], "names", quiet=True).find(pattern)
+        return [] if place is None else [place]
+    form = composed(pattern)
+    for spelled in (names, without_affix(names)):
+        found = [i for i, one in enumerate(spelled) if fnmatchcase(composed(one), form)]
+        if found:
+            return found
+    return []
 
 
 def instead_of(name: str, among: Sequence[str]) -> str | None:
@@ -155,21 +274,24 @@ def _require_different(
     raise InputError(field, expected, f"only {among[shared[0]]!r}", fix)
 
 
-def shape_drivers(controls: Sequence[str], shapes: Sequence[str]) -> FloatArray:
+def shape_drivers(
+    controls: Sequence[str], shapes: Sequence[str], quiet: bool = False
+) -> FloatArray:
     """Matrix of the rig's shapes that each control drives, whatever the spelling of either.
 
     A control drives the shape of its name; where the rig has a left and a right half of it
     instead, both. The result (P, K) is 1 where a control drives a shape, else 0: poses (n, P) times
-    this are settings of the rig.
+    this are settings of the rig. A prefix or suffix of either list is seen through, and the log
+    names it unless it is to be `quiet`.
 
     Raises `InputError` when the rig has no shape for a control, or one shape for two of them.
     """
-    index = NameIndex(shapes)
+    index = NameIndex.among(shapes, controls, "/target/names", halves=True, quiet=quiet)
     driven = [index.find_halves(control) for control in controls]
     unknown = [name for name, found in zip(controls, driven, strict=True) if not found]
     if unknown:
         near = nearest(unknown[0], shapes)
-        hint = f" (did you mean {near!r}?)" if near else ""
+        hint = f" (did you mean {contrasted(near, unknown[0])}?)" if near else ""
         unmatched = f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all"
         expected, fix = "controls that the rig has a shape for", "Give the rig of its character."
         raise InputError("/target/names", expected, unmatched, fix)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 from facert.errors import InputError
@@ -86,20 +87,10 @@ class Regions:
         Raises `InputError` for a name that the take lacks, with the nearest one that it has; for a
         control that is in no region.
         """
-        from facert.data.names import match  # NumPy, which the settings and `--help` do without
-
-        def spelled(part: Region, key: str, among: Sequence[str]) -> tuple[str, ...]:
-            found = match(getattr(part, key), among, f"regions.{part.name}.{key}")
-            return tuple(among[index] for index in found)
-
-        found = Regions(
-            tuple(
-                Region(
-                    one.name, spelled(one, "markers", markers), spelled(one, "controls", controls)
-                )
-                for one in self.parts
-            )
-        )
+        of_markers = self._spelled("markers", markers)
+        of_controls = self._spelled("controls", controls)
+        names = (part.name for part in self.parts)
+        found = Regions(tuple(map(Region, names, of_markers, of_controls)))
         moved = {control for part in found.parts for control in part.controls}
         idle = [control for control in controls if control not in moved]
         if idle:
@@ -109,6 +100,18 @@ class Regions:
                 "regions", "every control in a region", f"{idle[0]!r}{also} in none", fix
             )
         return found
+
+    def _spelled(self, key: str, among: Sequence[str]) -> list[tuple[str, ...]]:
+        """The markers or controls of each region, in the spelling of a take."""
+        from facert.data.names import NameIndex  # NumPy, which settings and `--help` do without
+
+        lists = [getattr(part, key) for part in self.parts]
+        index = NameIndex.among(among, list(dict.fromkeys(chain(*lists))), f"regions: {key}")
+        places = [
+            index.places(names, f"regions.{part.name}.{key}")
+            for part, names in zip(self.parts, lists, strict=True)
+        ]
+        return [tuple(among[place] for place in found) for found in places]
 
     def seen_by(self, markers: Sequence[str]) -> Regions:
         """The regions with only those of their markers that are among the given ones.

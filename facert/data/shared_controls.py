@@ -76,7 +76,8 @@ def require_shared(truth: Take, result: Take, fix: str) -> SharedControls:
 
 def _pairs(ours: tuple[str, ...], theirs: tuple[str, ...]) -> list[tuple[int, int]]:
     """Index pairs of the shared names; only mutual matches count, so none is used twice."""
-    here, there = NameIndex(ours), NameIndex(theirs)
+    there = NameIndex.among(theirs, ours, "/target/names")
+    here = NameIndex.among(ours, theirs, "/target/names", quiet=True)
     found = ((i, there.find(name)) for i, name in enumerate(ours))
     return [(i, j) for i, j in found if j is not None and here.find(theirs[j]) == i]
 

@@ -6,6 +6,7 @@ writes ``é`` as two characters, other systems as one.
 
 from __future__ import annotations
 
+import difflib
 import itertools
 import re
 import unicodedata
@@ -85,6 +86,25 @@ def joined(found: Sequence[str]) -> str:
 def is_number(word: str) -> bool:
     """Whether a word is a number."""
     return _NUMBER.fullmatch(word) is not None
+
+
+def contrasted(name: str, other: str) -> str:
+    """The name in quotes, with the code points of what may look the same in another one.
+
+    >>> contrasted("jaw", "jow"), contrasted("j\u0430w", "jaw")
+    ("'jaw'", "'j\u0430w' (\u0430 is U+0430, not a)")
+    """
+    changes = difflib.SequenceMatcher(a=name, b=other, autojunk=False).get_opcodes()
+    parts = [
+        f"{name[a:b] or 'nothing'} is {_points(name[a:b])}, not {_points(other[c:d]) or 'that'}"
+        for tag, a, b, c, d in changes
+        if tag != "equal" and not (name[a:b] + other[c:d]).isascii()
+    ]
+    return f"{name!r} ({'; '.join(parts)})" if parts else repr(name)
+
+
+def _points(text: str) -> str:
+    return " + ".join(sign if sign.isascii() else f"U+{ord(sign):04X}" for sign in text)
 
 
 def part_of_face(name: str) -> str:

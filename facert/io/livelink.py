@@ -20,7 +20,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.clock import rising
-from facert.data.names import ARKIT_NAMES, canonical, match, nearest
+from facert.data.names import ARKIT_NAMES, NameIndex, canonical, nearest
 from facert.data.resampling import nominal_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.text import plural
@@ -198,7 +198,8 @@ def _arkit_columns(take: Take) -> FloatArray:
     """The poses, else the source weights, in the order of the CSV, (T, 61)."""
     names, values = named_curves(take)
     field = "/source/names" if take.params is None else "/target/names"
-    foreign = [name for name in names if canonical(name) not in ARKIT_NAMES]
+    index = NameIndex.among(ARKIT_NAMES, names, field)
+    foreign = [name for name in names if index.find(name) is None]
     if foreign:
         near = nearest(foreign[0], ARKIT_NAMES)
         found = f"{foreign[0]!r}" + (f" (nearest: {near!r})" if near else "")
@@ -206,7 +207,7 @@ def _arkit_columns(take: Take) -> FloatArray:
         raise InputError(field, "ARKit shapes and angles", found, fix)
     columns = np.zeros((len(values), len(ARKIT_NAMES)))
     columns[np.isnan(values).all(axis=1)] = np.nan
-    columns[:, match(names, ARKIT_NAMES, field)] = values
+    columns[:, index.places(names, field)] = values
     if len(names) < len(ARKIT_NAMES):
         absent = plural(len(ARKIT_NAMES) - len(names), "column")
         log.info("%s that the take has not: 0", absent)

@@ -134,7 +134,8 @@ def _halves(controls: Sequence[str]) -> IntArray:
 
     A control without sides is both of its halves.
     """
-    index, found, halved = NameIndex(controls), [], []
+    index = NameIndex.among(controls, PACKET_NAMES, "--out livelink", halves=True)
+    found, halved = [], []
     for place, name in enumerate(PACKET_NAMES):
         columns = index.find_halves(name)
         if columns:

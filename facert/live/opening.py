@@ -115,8 +115,9 @@ class PlacementWatch(RestWatch):
     def __init__(self, retargeter: Retargeter, names: Sequence[str]) -> None:
         super().__init__(SECONDS, FaultDetector(len(names)))
         self._retargeter = retargeter
-        index = NameIndex(names)
-        found = [(index.find(name), row) for row, name in enumerate(retargeter.source_names)]
+        own = retargeter.source_names
+        index = NameIndex.among(names, own, "/source/names", quiet=True)
+        found = [(index.find(name), row) for row, name in enumerate(own)]
         self._rows = [(theirs, ours) for theirs, ours in found if theirs is not None]
 
     def warn(self) -> None:

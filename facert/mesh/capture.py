@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex
 from facert.data.rig import Rig
-from facert.data.spelling import folded
 from facert.data.take import Controls, Source, Take
 from facert.data.text import plural
 from facert.errors import InputError
@@ -141,17 +140,9 @@ def _drive(rig: Rig, source: Source) -> IntArray:
 
 
 def _matching_weights(shapes: Sequence[str], weights: Sequence[str]) -> IntArray:
-    index = NameIndex(weights)
-    found = [index.find(name) for name in shapes]
-    for position, name in enumerate(shapes):
-        if found[position] is None:
-            found[position] = index.find(_without_side(name))
+    index = NameIndex.among(weights, shapes, "/source/names")
+    found = [index.find_whole(name) for name in shapes]
     return np.array([-1 if weight is None else weight for weight in found], dtype=np.int64)
-
-
-def _without_side(name: str) -> str:
-    """The whole of which a shape with a side is one half."""
-    return folded(name).removesuffix("left").removesuffix("right")
 
 
 def _largest_deviation(positions: FloatArray) -> float:

@@ -178,12 +178,12 @@ def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Give
         raise InputError("given controls", "at least one", "none", "Set a control to a value.")
     if not (math.isfinite(soft) and soft >= 0.0):
         raise InputError("soft", "a standard deviation from 0", f"{soft}", "Give another.")
-    index = NameIndex(controls.names)
+    index = NameIndex.among(controls.names, list(wanted), "given controls")
     for name in wanted:
         if index.find(name) is None:
             fix = _did_you_mean(name, controls.names)
             raise InputError("given controls", "names of controls", repr(name), fix)
-    positions = match(list(wanted), controls.names, "given controls")
+    positions = index.places(list(wanted), "given controls")
     values = np.array(list(wanted.values()), dtype=np.float64)
     for name, position, value in zip(wanted, positions, values, strict=True):
         low, high = (-np.inf, np.inf) if controls.limits is None else controls.limits[position]

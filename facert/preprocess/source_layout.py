@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import NameIndex, match
+from facert.data.names import NameIndex
 from facert.data.take import Source, SourceKind
 from facert.errors import InputError
 
@@ -59,21 +59,21 @@ class SourceLayout:
         Raises
         ------
         InputError
-            For misspelt names, or names of another set.
+            For misspelt names, names of another set, or of two subjects.
         """
-        index = NameIndex(names)
+        index = NameIndex.among(names, self.names, "/source/names")
         absent = [name for name in self.names if index.find(name) is None]
         present = [name for name in self.names if index.find(name) is not None]
         extra = len(names) - len(present)
         if absent and (extra or len(absent) > len(present)):
-            match(absent, names, "/source/names")  # names which, and the nearest name
+            index.places(absent, "/source/names")  # names which, and the nearest name
         if absent:
             log.warning("taken as not observed, as the take lacks them: %s", ", ".join(absent))
         if extra:
             log.info("%d names of the source are not in the model: passed over", extra)
         seen = np.isin(self.names, present)
         places = np.zeros(len(self.names), dtype=np.int64)
-        places[seen] = match(present, names, "/source/names")
+        places[seen] = index.places(present, "/source/names")
         numbers = np.arange(self.width)
         return SourceColumns(
             self.names,

@@ -77,7 +77,7 @@ def actor_face(take: Take, rig: Rig) -> Face:
     InputError
         When the rig has a shape for none of the weights, see `facert.data.names.shape_drivers`.
     """
-    index = NameIndex(rig.names)
+    index = NameIndex.among(rig.names, take.source.names, "--rig", halves=True, quiet=True)
     known = [name for name in take.source.names if index.find_halves(name)]
     if not known:
         raise _misfit("shapes for the take's weights", f"none for {take.source.names[0]!r}")
@@ -90,7 +90,7 @@ def actor_face(take: Take, rig: Rig) -> Face:
 def drives(rig: Rig, names: Sequence[str]) -> bool:
     """Whether a rig has a shape, or its two halves, for every name."""
     try:
-        shape_drivers(names, rig.names)
+        shape_drivers(names, rig.names, quiet=True)
     except InputError:
         return False
     return True

@@ -77,7 +77,7 @@ def clean_with_model(
         name = retargeter.settings.method
         log.warning("%s cleans by the take alone; shared models clean by what they learned", name)
     found = retargeter.retarget(take, options=options).source
-    index = NameIndex(take.source.names)
+    index = NameIndex.among(take.source.names, found.names, "/source/names", quiet=True)
     places = [index.find(name) for name in found.names]
     shown = np.zeros(found.valid.shape, dtype=np.bool_)
     there = [column for column, place in enumerate(places) if place is not None]

@@ -159,7 +159,7 @@ def _keys_with(values: FloatArray, keys: Sequence[int], field: str) -> IntArray:
 
 def _partners(source: Source, target: Source) -> IntArray | None:
     """Index of the source marker with each target marker's name; None unless all have one."""
-    index = NameIndex(source.names)
+    index = NameIndex.among(source.names, target.names, "/source/names")
     found = [index.find(name) for name in target.names]
     if source.kind == "markers" and None not in found and len(set(found)) == len(found):
         return np.array(found, dtype=np.int64)

@@ -9,7 +9,7 @@ from safetensors.numpy import load, save
 
 import facert as api
 from facert import Settings
-from facert.data.take import Controls
+from facert.data.take import Controls, Source
 
 
 @pytest.fixture(scope="module")
@@ -253,3 +253,19 @@ def test_a_device_that_is_not_there_is_wrong_usage(facert, files):
     assert failed.code == 2
     assert "--device cuda:99" in failed.err
     assert not out.exists()
+
+
+@pytest.mark.parametrize("prefix", ["Face1:blendShape1.", "BS_node."])
+def test_a_shot_whose_names_have_a_prefix_is_retargeted_as_without(facert, files, prefix, tmp_path):
+    take, out, model = files
+    shot = api.read_take(take)
+    names = [f"{prefix}{name}" for name in shot.source.names]
+    api.write_take(replace(shot, source=Source(shot.source.values, names)), tmp_path / "shot.h5")
+    done = facert("retarget", tmp_path / "shot.h5", out, "--model", model)
+    assert done.code == 0, done.err
+    assert done.err.count(f"without the prefix '{prefix}'") == 1
+    facert("retarget", take, tmp_path / "plain.h5", "--model", model)
+    result, plain = api.read_take(out), api.read_take(tmp_path / "plain.h5")
+    np.testing.assert_array_equal(result.params, plain.params)
+    assert result.controls.names == plain.controls.names
+    assert result.source.names == shot.source.names

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import unicodedata
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,3 +60,40 @@ def test_an_unknown_name_is_an_error_with_the_nearest_one() -> None:
 def test_a_map_that_makes_no_sense_is_refused(names: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         renamed(TAKE, names)
+
+
+FACES = ("Anna:jawOpen", "Anna:levé", "Ben:jawOpen")
+
+
+def test_a_pattern_removes_a_prefix_from_all_names_that_have_it() -> None:
+    rig = Rig(np.eye(3), np.zeros((3, 3, 3)), FACES, [[0, 1, 2]])
+    assert renamed(rig, {"Anna:*": "*"}).names == ("jawOpen", "levé", "Ben:jawOpen")
+    both = renamed(rig, {"Anna:*": "a_*", "ben:jaw_open": "b"})
+    assert both.names == ("a_jawOpen", "a_levé", "b")
+    found = renamed(replace(rig, names=("*1", "*2", "x")), {"*1": "chin"})
+    assert found.names == ("chin", "*2", "x")  # a star may be a part of a name
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ({"Anna:*": "x"}, "one \\* on either side"),
+        ({"*:*": "*"}, "one \\* on either side"),
+        ({"Carl:*": "*"}, "found 'Carl:\\*'"),
+        ({"*:jawOpen": "*"}, None),
+        ({"*a:jawOpen": "Ben:jawOpen*"}, None),
+    ],
+)
+def test_a_pattern_that_makes_no_sense_is_refused(names: dict, message: str | None) -> None:
+    rig = Rig(np.eye(3), np.zeros((3, 3, 3)), FACES, [[0, 1, 2]])
+    if message is None:
+        assert len(set(renamed(rig, names).names)) == 3
+    else:
+        with pytest.raises(InputError, match=message):
+            renamed(rig, names)
+
+
+def test_a_map_sees_through_a_prefix_and_forms_of_unicode() -> None:
+    names = ("Face1:jawOpen", "Face1:" + unicodedata.normalize("NFD", "sourcilLevé"), "Face1:x")
+    rig = Rig(np.eye(3), np.zeros((3, 3, 3)), names, [[0, 1, 2]])
+    assert renamed(rig, {"JawOpen": "a", "sourcilLevé": "b"}).names == ("a", "b", "Face1:x")
