@@ -8,7 +8,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 DEMO ?= build/demo
 
-.PHONY: demo test check format docs bench figures acceptance clean
+.PHONY: demo test check format docs bench figures acceptance mutants clean
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -44,6 +44,10 @@ docs: $(VENV)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/python -m experiments.bench
 	$(BIN)/python -m experiments.bench.topology
+
+# Small changes of the mathematics: a test must notice each.
+mutants: $(VENV)/.installed
+	$(BIN)/python -m experiments.mutants
 
 # Both need the real recordings (FACERT_DATA), take their time, and continue where they stopped.
 figures: $(VENV)/.installed

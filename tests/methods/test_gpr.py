@@ -42,6 +42,25 @@ def test_far_from_the_labels_the_std_grows(name):
     assert near.std.shape == Y.shape
 
 
+def test_the_papers_baseline_has_the_squared_exponential_alone():
+    """Where a linear term would explain all: its poses are those of Eq. (3) at the θ it found."""
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(20, 6))
+    Y = X @ rng.normal(size=(6, 3)) + 0.05 * rng.normal(size=(20, 3))
+    method = make_method(Settings(method="gpr"))
+    report = method.fit(Labelled(X, Y), Unlabelled(X[:0], Y[:0]))
+    theta1, theta2, theta3 = (report.figures[f"theta{i}"] for i in (1, 2, 3))
+    frames = 10.0 * rng.normal(size=(30, 6))
+
+    def k(A, B):
+        return theta1 * np.exp(-theta2 / 2 * np.sum((A[:, None] - B) ** 2, axis=2))
+
+    expected = k(frames, X) @ np.linalg.solve(k(X, X) + np.eye(20) / theta3, Y)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(method.predict(frames).Y, expected, atol=1e-6 * scale)
+    assert np.abs(method.predict(1e4 * frames).Y).max() < 1e-6 * scale
+
+
 @pytest.mark.parametrize("theta", [(1.0, 0.0, 1.0, 0.0), (1.0, 1.0, 0.0, 0.0), (1, 1, 1, -1)])
 def test_kernel_parameters_that_make_no_kernel_are_refused(theta):
     X, Y = frames_and_poses()

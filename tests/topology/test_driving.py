@@ -37,6 +37,42 @@ def test_equation_9_on_positions_drifts_at_rest(sheet):
     assert np.abs(literal - points).max() > 0.05
 
 
+def energies(points, faces):
+    """B of Algorithm 1 as it is printed, and LᵀL with L = I - D⁻¹A."""
+    joined = np.zeros((len(points), len(points)))
+    for face in faces:
+        joined[np.ix_(face, face)] = 1.0
+    B = np.zeros_like(joined)
+    for members in map(np.flatnonzero, joined):
+        local = points[members] - points[members].mean(axis=0)
+        g, _, _ = np.linalg.svd(local, full_matrices=False)
+        G = np.column_stack([np.full(len(local), len(local) ** -0.5), g[:, :2]])
+        B[np.ix_(members, members)] += np.eye(len(local)) - G @ G.T
+    A = joined - np.eye(len(points))
+    L = np.eye(len(points)) - A / A.sum(axis=1, keepdims=True)
+    return B, L.T @ L
+
+
+@pytest.mark.parametrize(
+    ("method", "of_framework", "of_laplacian"),
+    [("framework", 1.0, 0.0), ("smooth", 1.0, 0.3), ("laplacian", 0.0, 1.0)],
+)
+def test_displacements_have_the_least_energy_that_meets_the_points(
+    sheet, method, of_framework, of_laplacian
+):
+    """The default weighs the uniform Laplacian by 0.3, whatever the mesh and its unit."""
+    points, faces = sheet
+    given = moved(points, frames=1)
+    B, squared = energies(points, faces)
+    energy, free = of_framework * B + of_laplacian * squared, np.delete(np.arange(72), LABELLED)
+    expected = points.copy()
+    expected[LABELLED] = given[0]
+    pull = energy[np.ix_(free, LABELLED)] @ (given[0] - points[LABELLED])
+    expected[free] -= np.linalg.solve(energy[np.ix_(free, free)], pull)
+    found = FaceDriver(points, faces, LABELLED, method).deform(given)[0]
+    np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
 @pytest.mark.parametrize("method", list(METHODS))
 def test_points_are_met_and_moved_with_the_whole_face(sheet, method):
     points, faces = sheet

@@ -8,7 +8,7 @@ from facert.errors import InputError
 from facert.topology.affine import scaled_source
 from facert.topology.keyed import KeyedPerformance, even_keys
 from facert.topology.local_ridge import PENALTIES, _dual_weights
-from facert.topology.propagation import METHODS, propagate
+from facert.topology.propagation import METHODS, STILL, propagate
 from facert.topology.radial_basis import radial_basis
 
 FREE_OF_SPACE = [name for name in METHODS if name not in ("laplacian", "affine", "rbf-thin-plate")]
@@ -99,6 +99,50 @@ def test_displacements_and_positions_are_one_problem_where_affine_maps_cost_noth
     monkeypatch.setattr("facert.topology.propagation.STILL", 1e-8)
     take, _ = performance()
     np.testing.assert_allclose(propagate(take, "framework"), propagate(take, "literal"), atol=1e-6)
+
+
+def one_window(small, seed=0):
+    """Frames that one window holds, and a control that is one of three motions.
+
+    The second motion is so small beside the first, and alone moves the control.
+    """
+    rng = np.random.default_rng(seed)
+    X, _ = np.linalg.qr(rng.normal(size=(40, 4)) * [0.0, 1.0, 1.0, 1.0] + [1.0, 0.0, 0.0, 0.0])
+    X = X[:, 1:] * [1.0, small, 0.1]  # no mean
+    keys = np.arange(0, 40, 2)
+    poses = X[keys, None, 1:2] / small
+    return KeyedPerformance(X[:, None], keys, poses)
+
+
+@pytest.mark.parametrize("small", [0.003, 0.03, 0.3])
+@pytest.mark.parametrize("method", ["framework", "literal"])
+def test_with_all_frames_in_one_window_the_framework_is_a_ridge_regression(method, small):
+    """Free frames then cost nothing beside D_i, whose penalty is μ², μ a share of the largest."""
+    take = one_window(small)
+    X, x = take.frames, take.frames[take.keys]
+    penalty = (STILL * np.linalg.norm(X, 2)) ** 2 * np.eye(3)
+    mean, labels = x.mean(axis=0), take.labels[:, 0]
+    slopes = np.linalg.solve(
+        (x - mean).T @ (x - mean) + penalty, (x - mean).T @ (labels - labels.mean(axis=0))
+    )
+    expected = (X - mean) @ slopes + labels.mean(axis=0)
+    expected[take.keys] = labels
+    found = propagate(take, method, width=81)
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["framework", "literal"])
+def test_a_direction_of_three_hundredths_is_motion_and_one_of_three_thousandths_is_noise(method):
+    """Of the largest motion; between two keys the target then follows it, or does not."""
+
+    def followed(small):
+        take = one_window(small)
+        between = np.arange(1, 40, 2)
+        truth, found = take.frames[between, 1] / small, propagate(take, method, width=81)
+        return np.polyfit(truth, found[between, 0, 0], 1)[0]
+
+    assert followed(0.03) > 0.7
+    assert followed(0.003) < 0.2
 
 
 @settings(max_examples=20, deadline=None)

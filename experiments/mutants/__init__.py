@@ -1,0 +1,1 @@
+"""Small changes of the mathematics, each of which a test must notice."""
