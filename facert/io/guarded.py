@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import codecs
+import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from facert.errors import InputError
+
+log = logging.getLogger("facert")
 
 MAX_BYTES = 2**29
 """Largest file that is read as a whole: half a gibibyte."""
@@ -45,6 +49,22 @@ def read_text(path: Path) -> str:
     except (UnicodeDecodeError, OSError) as error:
         found, fix = "something else", "Save it as UTF-8."
         raise InputError("file", "UTF-8 text that can be read", found, fix) from error
+
+
+def read_old_text(path: Path) -> str:
+    """Read a text file whose writer may be older than UTF-8: UTF-16 with its mark, or Latin-1.
+
+    Raises `InputError` when the file is missing or too large, or UTF-16 without sense.
+    """
+    content = moderate_file(path).read_bytes()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        with parsing("file", "UTF-16 text", "Save it as UTF-8."):
+            return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        log.info("%s: no UTF-8, read as Latin-1 (Windows-1252)", path.name)
+        return content.decode("cp1252", errors="replace")
 
 
 @contextmanager

@@ -79,7 +79,7 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
         raise InputError(line, "separated cells", str(error), "Export it again.") from error
     if len(rows) < 2:
         raise InputError("file", "a header and rows", plural(len(rows), "line"), "Export it again.")
-    body = rows[1:] if separator == "," else _with_points(rows[1:])
+    body = rows[1:] if separator == "," else with_points(rows[1:])
     return tuple(cell.strip() for cell in rows[0].cells), body
 
 
@@ -88,7 +88,7 @@ def _separator(header: str) -> str:
     return max(SEPARATORS, key=header.count)
 
 
-def _with_points(rows: list[Line]) -> list[Line]:
+def with_points(rows: list[Line]) -> list[Line]:
     """Decimal points for decimal commas, unless both occur: then a comma may part thousands."""
     cells = [cell.strip() for row in rows for cell in row.cells]
     if any(map(_POINT.fullmatch, cells)):

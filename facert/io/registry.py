@@ -88,7 +88,8 @@ FORMATS = (
     Format(
         (".trc",),
         {"take": "trc.read_trc"},
-        reads="markers; where DataRate contradicts the column Time, the latter counts",
+        reads="markers; where DataRate or counts of the header contradict the frames, these count; "
+        "blanks, doubled tabs, UTF-16 and Latin-1 are read as well",
     ),
     Format(
         (".glb", ".gltf"),
