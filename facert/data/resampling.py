@@ -1,9 +1,9 @@
-"""Frame rates: that of a recording, and a take at another one.
+"""A take at another frame rate, at even times, or counted anew.
 
 A take is resampled by time: its values at new times, not its rows counted anew. Between two
 frames that follow each other values go linearly. What was not observed stays so: a new frame
-between an observed and a hidden one hides it too, and where the recording paused there are no new
-frames.
+between an observed and a hidden one hides it too, and where the recording paused, or frames are
+missing, nothing is observed in the new ones.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.rate import AGREES, frames_at, frames_shown, rate_shown, standard_rate
+from facert.data.rate import nominal_rate as nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.data.timecode import recounted
@@ -24,63 +26,144 @@ log = logging.getLogger("facert")
 PAUSE = 1.5
 """A step in time longer than so many nominal frames is a pause of the recording."""
 MAX_FRAMES = 2**22
-ONE_FRAME = 30.0
-"""The nominal rate of a single frame."""
+EVEN = 0.1
+"""Frames lie evenly when each is off by so much of a frame at most, besides rounding."""
 
 _SAME = 1e-6  # seconds: closer than this, a new frame is the old one
 _SLACK = 1e-4  # of a frame, by which the last one may lie beyond the recording
+_AT_PAUSE = 0.25  # of a frame: beside a pause, a new frame is an old one as near as this
 
 
 def resampled(take: Take, fps: float) -> Take:
-    """The take at evenly spaced times, from its first frame on.
+    """The take at evenly spaced times, from its first frame on: every frame of the new rate.
 
-    A pose between frames without one goes to the new frame that is nearest to it, half a frame away
-    at most; the log has how far poses moved, and those that found no frame. The start timecode
-    counts its frames at the new rate. Times stay where they have this rate, without pauses,
-    already.
+    In a pause of the recording nothing is observed. A pose between frames without one goes to the
+    new frame that is nearest to it, half a frame away at most, and in no pause; the log has how far
+    poses moved, and those that found no frame. The start timecode counts its frames at the new
+    rate. Where frames lie at these times already, up to rounding, their values stay as they are.
 
     Raises `InputError` when `fps` is not positive, or there would be more than `MAX_FRAMES` frames.
     """
     if not (np.isfinite(fps) and fps > 0):
         raise InputError("--fps", "a positive number", f"{fps}", "Give the rate of the output.")
-    steps = np.diff(take.time)
-    if np.abs(steps - 1 / fps).max(initial=0.0) <= _SAME:
+    fps = standard_rate(fps)
+    start = recounted(take.start_timecode, take.fps, fps)
+    agrees = abs(take.fps - fps) <= AGREES * fps
+    places = frames_at(take.time, fps, _SAME * fps) if agrees else None
+    if places is None:
+        return replace(_interpolated(take, fps), start_timecode=start)
+    return replace(_placed(take, places, fps), start_timecode=start)
+
+
+def evenly_spaced(take: Take) -> Take:
+    """The take as who plays a frame every 1/fps expects it, wherever its frames lie.
+
+    Frames that lie evenly stay as they are, missing ones come between them with nothing observed;
+    others are resampled, which the log has.
+
+    Raises `InputError` when there would be more than `MAX_FRAMES` frames.
+    """
+    places = frames_at(take.time, take.fps, EVEN)
+    if places is None:
+        even = _interpolated(take, take.fps)
+        log.info("frames lie unevenly: resampled to %d at %.6g a second", len(even), take.fps)
+        return even
+    return _placed(take, places, take.fps)
+
+
+def held(take: Take) -> Take:
+    """The take with the frame before, or else the first, where nothing was observed of it.
+
+    So it is done with the poses if there are any, else with the source weights. A frame without a
+    pose beside others without one stays as it is: nobody posed them. The log has how many were
+    held.
+    """
+    values = take.source.values if take.params is None else take.params
+    if values.ndim == 3:
+        return take
+    known = np.asarray(~np.isnan(values).all(axis=1))
+    lost = ~known & ~take.source.valid.any(axis=1)
+    rows = np.arange(len(take))
+    before = np.maximum.accumulate(np.where(lost, -1, rows))
+    after = np.minimum.accumulate(np.where(lost, len(take), rows)[::-1])[::-1]
+    left, right = np.maximum(before, 0), np.minimum(after, len(take) - 1)
+    holds = lost & ((before < 0) | known[left]) & ((after == len(take)) | known[right])
+    if not holds.any():
+        return take
+    frames = plural(int(holds.sum()), "missing frame")
+    log.warning("%s: held as the frame before, as rows are played evenly", frames)
+    whole = values[np.where(holds, np.where(before < 0, right, left), rows)]
+    if take.params is None:
+        return replace(take, source=replace(take.source, values=whole))
+    return replace(take, params=whole)
+
+
+def counted_at(take: Take, fps: float) -> Take:
+    """The take as one of so many frames a second, whatever its times are: its frames counted anew.
+
+    Missing frames stay missing. Where times are uneven but agree with the rate, they stay, too.
+
+    Raises `InputError` when they are uneven and contradict it.
+    """
+    fps = standard_rate(fps)
+    shown, frames = rate_shown(take.time), frames_shown(take.time)
+    start = recounted(take.start_timecode, take.fps, fps)
+    if len(take) > 1 and frames is None:
+        if abs(shown - fps) > AGREES * fps:
+            found, fix = f"{fps:.6g}", "Leave it out; --fps N resamples by time."
+            expected = f"about {shown:.4g}, as the file's uneven times show"
+            raise InputError("--in-fps", expected, found, fix)
+        return replace(take, fps=fps, start_timecode=start)
+    if frames is None or abs(shown - fps) <= 1e-6 * fps:
+        return replace(take, fps=fps, start_timecode=start)
+    log.info("the file's times show %.6g frames/s: counted at %.6g", shown, fps)
+    time = (take.time[0] * shown + frames) / fps
+    return replace(take, time=time, fps=fps, start_timecode=start)
+
+
+def _placed(take: Take, places: IntArray, fps: float) -> Take:
+    """The take with its frames at these places of an even grid, the others unobserved.
+
+    Times stay where no frame is missing: they may be more exact than the grid.
+    """
+    if len(take) == places[-1] + 1:
         return replace(take, fps=fps)
+    _check_count(places[-1] + 1)
+    count = int(places[-1]) + 1
+
+    def spread(rows: FloatArray | None) -> FloatArray | None:
+        if rows is None:
+            return None
+        filled = np.full((count, *rows.shape[1:]), np.nan)
+        filled[places] = rows
+        return filled
+
+    values = spread(take.source.values)
+    assert values is not None
+    source = replace(take.source, values=values, std=spread(take.source.std))
+    time = take.time[0] + np.arange(count) / fps
+    params, std = spread(take.params), spread(take.std)
+    return replace(take, time=time, source=source, params=params, std=std, fps=fps)
+
+
+def _interpolated(take: Take, fps: float) -> Take:
     time = _new_times(take, fps)
     params, std = _poses_at(time, take, fps)
-    return replace(
-        take,
-        time=time,
-        source=_source_at(time, take),
-        params=params,
-        std=std,
-        fps=fps,
-        start_timecode=recounted(take.start_timecode, take.fps, fps),
-    )
-
-
-def nominal_rate(time: FloatArray) -> float:
-    """Frames a second by the usual spacing of the frames; whole where that is within 1 %.
-
-    `ONE_FRAME` for times (T,) that do not rise, or a single frame; gaps do not count.
-    """
-    if time.ndim != 1 or len(time) < 2 or not (time[1:] > time[:-1]).all():
-        return ONE_FRAME
-    rate = 1.0 / float(np.median(np.diff(time)))
-    whole = float(np.rint(rate))
-    return whole if abs(rate - whole) <= 0.01 * rate else rate
+    source = _source_at(time, take, fps)
+    return replace(take, time=time, source=source, params=params, std=std, fps=fps)
 
 
 def _new_times(take: Take, fps: float) -> FloatArray:
-    """Times of the new frames, (n,): those that lie in no pause."""
+    """Times of the new frames, (n,)."""
     first, last = take.time[0], take.time[-1]
     count = np.floor((last - first) * fps + _SLACK) + 1
+    _check_count(count)
+    return np.asarray(np.minimum(first + np.arange(int(count)) / fps, last))
+
+
+def _check_count(count: float) -> None:
     if count > MAX_FRAMES:
         raise InputError("--fps", f"at most {MAX_FRAMES} frames", f"{count:g}", "Lower the rate.")
-    time = np.minimum(first + np.arange(int(count)) / fps, last)
-    before, after = _neighbours(time, take.time)
-    paused = take.time[after] - take.time[before] > PAUSE / take.fps
-    return np.asarray(time[~paused])
 
 
 def nearest_frames(time: FloatArray, wanted: FloatArray) -> IntArray:
@@ -91,28 +174,35 @@ def nearest_frames(time: FloatArray, wanted: FloatArray) -> IntArray:
     return np.where(closer, before, after).astype(np.int64)
 
 
-def _neighbours(time: FloatArray, old: FloatArray) -> tuple[IntArray, IntArray]:
-    """The old frames at or before, and at or after, each new time; the same one where they meet."""
+def _neighbours(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, IntArray, BoolArray]:
+    """The old frames at or before, and at or after, each new time, and which lie in a pause.
+
+    The two are the same one where they meet, and beside a pause where they nearly do.
+    """
+    old = take.time
     nearest = nearest_frames(old, time)
-    met = np.abs(old[nearest] - time) <= _SAME
     after = np.clip(np.searchsorted(old, time, side="right"), min(1, len(old) - 1), len(old) - 1)
     before = np.maximum(after - 1, 0)
-    return np.where(met, nearest, before), np.where(met, nearest, after)
+    paused = old[after] - old[before] > PAUSE / take.fps
+    met = np.abs(old[nearest] - time) <= np.where(paused, _AT_PAUSE / fps, _SAME)
+    return np.where(met, nearest, before), np.where(met, nearest, after), paused & ~met
 
 
-def _source_at(time: FloatArray, take: Take) -> Source:
+def _source_at(time: FloatArray, take: Take, fps: float) -> Source:
     std = take.source.std
-    spread = None if std is None else _at(time, take.time, std.reshape(len(std), -1))
-    return take.source.with_matrix(_at(time, take.time, take.source.matrix), spread)
+    spread = None if std is None else _at(time, take, fps, std.reshape(len(std), -1))
+    return take.source.with_matrix(_at(time, take, fps, take.source.matrix), spread)
 
 
-def _at(time: FloatArray, old: FloatArray, values: FloatArray) -> FloatArray:
-    """Rows of values (T, D) at new times, (n, D); NaN where a neighbour is NaN."""
-    before, after = _neighbours(time, old)
-    span = np.where(before == after, 1.0, old[after] - old[before])
-    share = np.where(before == after, 0.0, (time - old[before]) / span)[:, None]
+def _at(time: FloatArray, take: Take, fps: float, values: FloatArray) -> FloatArray:
+    """Rows of values (T, D) at new times, (n, D); NaN in a pause, and where a neighbour is NaN."""
+    before, after, paused = _neighbours(time, take, fps)
+    span = np.where(before == after, 1.0, take.time[after] - take.time[before])
+    share = np.where(before == after, 0.0, (time - take.time[before]) / span)[:, None]
     mixed = (1 - share) * values[before] + share * values[after]
-    return np.where(before[:, None] == after[:, None], values[before], mixed)
+    mixed = np.where(before[:, None] == after[:, None], values[before], mixed)
+    mixed[paused] = np.nan
+    return mixed
 
 
 def _poses_at(
@@ -123,7 +213,7 @@ def _poses_at(
         return None, None
     places, alone = _single_poses(time, take, fps)
     params, std = (
-        None if values is None else _at(time, take.time, values)
+        None if values is None else _at(time, take, fps, values)
         for values in (take.params, take.std)
     )
     if params is not None:
@@ -140,15 +230,15 @@ def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, I
     """
     known = np.zeros(len(take), dtype=np.bool_)
     known[take.labels] = True
-    before, after = _neighbours(time, take.time)
-    between = known[before] & known[after]
+    before, after, paused = _neighbours(time, take, fps)
+    between = known[before] & known[after] & ~paused
     alone = np.setdiff1d(take.labels, np.append(before[between], after[between]))
     nearest = nearest_frames(time, take.time[alone])
     shifts = np.abs(time[nearest] - take.time[alone])
     order = np.argsort(shifts, kind="stable")  # of two for one frame, the nearer one
     places, first = np.unique(nearest[order], return_index=True)
     chosen = order[first]
-    good = ~between[places] & (shifts[chosen] <= 0.5 / fps + _SAME)
+    good = ~between[places] & ~paused[places] & (shifts[chosen] <= 0.5 / fps + _SAME)
     _log_moves(shifts[chosen[good]], len(alone) - int(good.sum()))
     return places[good], alone[chosen[good]]
 

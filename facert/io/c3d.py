@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.rate import standard_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -69,6 +70,7 @@ def _read(file: BinaryIO) -> Take:
     rate = float(reader.point_rate)
     if not 0 < rate < np.inf:
         raise InputError("POINT:RATE", "frames a second", f"{rate}", "Export the file again.")
+    rate = standard_rate(rate)
     return Take(
         time=np.arange(len(positions)) / rate,
         source=Source(positions, _without_subject(labels)),

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.rate import standard_rate
 from facert.data.take import Source, Take, named_curves
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
@@ -146,7 +147,7 @@ def _rate(document: Mapping[str, Any], fps: float | None) -> float:
         raise InputError(
             _RATES[0], "the frames' rate", found, "Write it, or run facert convert with --in-fps."
         )
-    return float(rate)
+    return standard_rate(rate)
 
 
 def _text(document: Mapping[str, Any], key: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from facert.data.clock import put_together
 from facert.data.names import canonical
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError, reading
 from facert.io.lines import Line, check_width, read_lines, to_numbers

@@ -8,10 +8,12 @@ from inspect import signature
 from pathlib import Path
 from typing import Literal
 
+from facert.data.rate import standard_rate
+from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig
 from facert.data.take import Take
 from facert.data.text import plural
-from facert.errors import InputError
+from facert.errors import InputError, reading
 from facert.io.guarded import existing_file
 from facert.io.registry import (
     FORMATS,
@@ -35,6 +37,7 @@ def read_any(
     shapes: str | None = None,
     fps: float | None = None,
     kind: TakeOrRig | None = None,
+    or_fps: float | None = None,
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -45,15 +48,17 @@ def read_any(
         Which target, or set of shapes, of an .npz file that holds several; which animation of a
         glTF file.
     fps : float, optional
-        Frames a second of a file that does not state it.
+        Frames a second of a take, whatever the file states: its frames are counted anew.
     kind : {"take", "rig"}, optional
         What to read of a file that can hold both, as glTF does; by default the rig.
+    or_fps : float, optional
+        Frames a second of a file that does not state it, where there is no `fps`.
 
     Raises
     ------
     InputError
-        For an unknown ending, a file of another kind than its ending, or a `target` of a take
-        that cannot have several.
+        For an unknown ending, a file of another kind than its ending, a `target` of a take that
+        cannot have several, or an `fps` that uneven times contradict.
     """
     path = Path(path)
     if not path.is_dir():
@@ -67,10 +72,20 @@ def read_any(
         able = ", ".join(e for one in FORMATS if _has_targets(one) for e in one.endings)
         fix = "Leave it out: there is nothing to choose."
         raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
-    options = {"target": target, "shapes": shapes, "fps": fps}
+    fps = None if fps is None else standard_rate(fps)
+    options = {"target": target, "shapes": shapes, "fps": fps or or_fps}
     taken = signature(reader).parameters.keys() & options.keys()
     read: Take | Rig = reader(path, **{name: options[name] for name in taken})
-    return read
+    return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
+
+
+def _at_rate(found: Take | Rig, fps: float, asked: bool, path: Path) -> Take | Rig:
+    """What was read, at so many frames a second; `asked`: its reader knew of them."""
+    with reading(path):
+        if isinstance(found, Rig):
+            found_instead = "a rig, which has no frames"
+            raise InputError("--in-fps", "a take", found_instead, "Leave it out.")
+        return found if asked and found.fps == fps else counted_at(found, fps)
 
 
 def _has_targets(one: Format) -> bool:
@@ -85,7 +100,11 @@ def read_take_file(path: Path, target: str | None = None, fps: float | None = No
     InputError
         Also when the file holds a rig.
     """
-    found = read_any(path, target=target, fps=fps, kind="take")
+    return require_take(read_any(path, target=target, fps=fps, kind="take"), path)
+
+
+def require_take(found: Take | Rig, path: Path) -> Take:
+    """What was read, if it is a take; raises `InputError` naming the file when it is a rig."""
     if isinstance(found, Rig):
         raise InputError("file", "a take", "a rig", "Give a performance.", where=str(path))
     return found
@@ -159,6 +178,8 @@ def read_mesh(path: Path, shapes: str | None = None) -> Mesh:
 def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
     """Write a take in the format that the name's ending asks for.
 
+    Formats that are played row by row get even rows, see `facert.data.resampling.evenly_spaced`.
+
     Raises
     ------
     InputError
@@ -167,9 +188,12 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
         When `path` exists and `overwrite` is not set.
     """
     path = Path(path)
-    require_output(path, overwrite, "take")
+    missing = require_output(path, overwrite, "take").missing
     if path.suffix.lower() not in OWN_ENDINGS:
         _warn_of_loss(take, path)
+    with reading(path):
+        take = evenly_spaced(take) if missing else take
+        take = held(take) if missing == "held" else take
     write("take", take, path, overwrite)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.clock import rising
 from facert.data.names import ARKIT_NAMES, NameIndex, canonical, nearest
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.text import plural
 from facert.data.timecode import (

@@ -26,7 +26,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray, require_shape
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate, standard_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, reading
@@ -213,7 +213,7 @@ def _choose(present: list[str], asked: str | None, option: str) -> str | None:
 def _clock(archive: Archive, frames: int, fps: float | None) -> tuple[FloatArray, float]:
     """Time of the frames, and the nominal rate."""
     if "fps" in archive:
-        fps = archive.number("fps")
+        fps = standard_rate(archive.number("fps"))
     elif "time" in archive:
         fps = nominal_rate(archive.numbers("time"))
     if not fps:

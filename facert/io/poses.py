@@ -9,21 +9,28 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.labelling import Poses, poses_of, predicted_poses
+from facert.data.rate import frames_shown, standard_rate
+from facert.data.resampling import counted_at
+from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.formats import read_take_file
+from facert.io.formats import read_any, require_take
 from facert.io.lines import check_width, read_csv, read_header, to_numbers
+from facert.io.livelink import is_livelink
 
 log = logging.getLogger("facert")
 
 MAX_FRAMES = 2**31
 
 _FRAME = "frame"
+_FRAMES = 5.0  # rows a second of a table, which are frames and not poses now and then
 
 
 def read_poses(path: Path, fps: float | None = None) -> Poses:
     """Read poses: of a CSV with a column ``frame``, its rows; else of a take, by their times.
+
+    `fps` is the rate of the recording, whatever the file states.
 
     Raises `InputError` when the file cannot be read, a row names no frame, there are no poses in
     it, or a model predicted them all.
@@ -32,9 +39,24 @@ def read_poses(path: Path, fps: float | None = None) -> Poses:
     with reading(path):
         if path.suffix.lower() == ".csv" and _names_frames(read_header(path)):
             return replace(_read_numbered(path), where=str(path))
-        take = read_take_file(path, fps=fps)
+        take = _at_rate(read_any(path, kind="take", or_fps=fps), path, fps)
         _require_set(take, path)
         return replace(poses_of(take), where=str(path))
+
+
+def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
+    """The take at the rate of the recording that its poses are for.
+
+    Poses now and then, by their seconds, are no frames to be counted: their times stay.
+    """
+    take = require_take(found, path)
+    if fps is None or abs(take.fps - standard_rate(fps)) <= 1e-6 * fps:
+        return take
+    table = path.suffix.lower() == ".csv" and not is_livelink(read_header(path))
+    if frames_shown(take.time) is None or (table and take.fps < _FRAMES):
+        log.info("%s: the times of its poses stay: --in-fps counts frames", path.name)
+        return take
+    return counted_at(take, fps)
 
 
 def _require_set(take: Take, path: Path) -> None:

@@ -16,6 +16,7 @@ from facert.errors import InputError, OutputExistsError
 
 Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
 Use = Literal["read", "write"]
+Missing = Literal["held", "marked", ""]
 
 FOLDER = "/"
 """The ending of a folder."""
@@ -36,6 +37,9 @@ class Format:
     """From the path, and the kind that was asked for or None, to what that very file holds."""
     targets: str = ""
     """From the path to the targets of a take in it, and the controls of each."""
+    missing: Missing = ""
+    """What stands for missing frames where a file is played row by row at its rate, so that rows
+    have to be even: the frame before, or a row that says so; empty where rows have their times."""
     about: str = ""
     """What writes such takes, for ``--help``."""
     reads: str = ""
@@ -63,6 +67,7 @@ FORMATS = (
     Format(
         (".livelink.csv",),  # read as .csv: the header decides
         write={"take": "livelink.write_livelink"},
+        missing="marked",
         reads="Live Link Face",
         writes="poses (else source weights), if they are ARKit's",
     ),
@@ -79,6 +84,7 @@ FORMATS = (
         (".json",),
         read={"take": "curves.read_curves"},
         write={"take": "curves.write_curves"},
+        missing="held",
         about=" of Audio2Face",
         reads="Audio2Face curves",
         writes="poses (else source weights)",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import facert
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate
 from facert.errors import FacertError, InputError, NumericalError
 from facert.live.frames import Frame
 from facert.live.opening import PlacementWatch, RestWatch

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate
 from facert.data.take import Controls, Source, Take
 from facert.errors import FacertError, InputError, OutputExistsError
 from facert.io.formats import write_take_file

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data.resampling import resampled
+from facert.data.rate import nominal_rate
+from facert.data.resampling import counted_at, evenly_spaced, resampled
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 
@@ -59,12 +60,38 @@ def test_uneven_frames_become_even_ones() -> None:
     np.testing.assert_allclose(found.source.values, line(found.time), atol=1e-12)
 
 
-def test_a_pause_of_the_recording_stays_one() -> None:
+def test_a_pause_of_the_recording_has_frames_in_which_nothing_is_observed() -> None:
     time = np.delete(np.arange(60) / 30, range(20, 40))
     found = resampled(make(time, 30.0), 120.0)
     inside = (found.time > 19 / 30 + 1e-9) & (found.time < 40 / 30 - 1e-9)
-    assert not inside.any()
-    assert len(found) == 4 * 19 + 1 + 4 * 19 + 1
+    np.testing.assert_array_equal(found.source.valid.any(axis=1), ~inside)
+    np.testing.assert_allclose(found.time, np.arange(4 * 59 + 1) / 120)
+    np.testing.assert_allclose(found.source.values[~inside], line(found.time)[~inside])
+
+
+def test_missing_frames_come_back_unobserved_at_the_same_rate() -> None:
+    time = np.round(np.delete(np.arange(60) / 30, [7, 20, 21]), 3)
+    found = resampled(make(time, 30.0, start_timecode="10:00:00:00"), 30.0)
+    np.testing.assert_allclose(found.time, np.arange(60) / 30)
+    assert np.flatnonzero(~found.source.valid.any(axis=1)).tolist() == [7, 20, 21]
+    kept = np.delete(np.arange(60), [7, 20, 21])
+    np.testing.assert_array_equal(found.source.values[kept], line(time))  # to the last bit
+
+
+def test_all_that_a_result_has_goes_with_its_frames() -> None:
+    take = posed(list(range(61)))
+    take = replace(take, std=take.params / 10)
+    kept = np.delete(np.arange(61), range(30, 36))
+    source = Source(take.source.values[kept], NAMES)
+    fields = {name: getattr(take, name)[kept] for name in ("time", "params", "std")}
+    holed = replace(take, source=source, **fields)
+    for fps in (60.0, 30.0, 24.0):
+        found = resampled(holed, fps)
+        gone = (found.time > 29 / 60 + 1e-9) & (found.time < 36 / 60 - 1e-9)
+        assert len(found) == round(fps) + 1
+        np.testing.assert_allclose(found.params[~gone, 0], 60 * found.time[~gone], atol=0.51)
+        assert np.isnan(found.std[gone]).mean() > 0.6
+        assert len(found.labels) < len(found)
 
 
 def test_a_gap_of_a_marker_stays_one() -> None:
@@ -155,3 +182,51 @@ def test_a_single_frame_stays() -> None:
 def test_a_rate_that_makes_no_sense_is_refused(fps: float) -> None:
     with pytest.raises(InputError, match="--fps"):
         resampled(TAKE, fps)
+
+
+def phone(seconds: float) -> np.ndarray:
+    """Times of a camera that gives 27 to 31 frames a second, as it is warm or dark."""
+    steps = 1 / (29 + 2 * np.sin(np.arange(int(31 * seconds)) / 50))
+    return np.round(np.cumsum(steps), 3)
+
+
+def test_uneven_frames_are_played_at_the_moments_when_they_were(caplog) -> None:
+    caplog.set_level(logging.INFO, "facert")
+    time = phone(60)
+    found = evenly_spaced(make(time, nominal_rate(time)))
+    np.testing.assert_allclose(found.time - found.time[0], np.arange(len(found)) / found.fps)
+    np.testing.assert_allclose(found.source.values, line(found.time), atol=1e-9)
+    assert "frames lie unevenly: resampled" in caplog.text
+
+
+@pytest.mark.parametrize("digits", [2, 3, 6])
+@pytest.mark.parametrize("fps", [24.0, 25.0, 30000 / 1001, 30.0, 60.0])
+def test_even_frames_stay_as_they_are_however_rounded(fps: float, digits: int) -> None:
+    take = make(np.round(np.arange(18_000) / fps + 0.2, digits), fps)
+    found = evenly_spaced(take)
+    np.testing.assert_array_equal(found.time, take.time)
+    np.testing.assert_array_equal(found.source.values, take.source.values)
+
+
+def test_frames_are_counted_anew_with_their_gaps(caplog) -> None:
+    caplog.set_level(logging.INFO, "facert")
+    time = np.delete(np.arange(60.0), [20, 21])
+    found = counted_at(make(time, 1.0), 25.0)
+    np.testing.assert_allclose(found.time, time / 25)
+    assert found.fps == 25.0
+    assert "show 1 frames/s: counted at 25" in caplog.text
+
+
+def test_a_rate_that_uneven_frames_contradict_is_refused() -> None:
+    time = phone(10)
+    with pytest.raises(InputError, match="--in-fps: expected about 2"):
+        counted_at(make(time, 30.0), 60.0)
+    shown = nominal_rate(time)
+    np.testing.assert_array_equal(counted_at(make(time, 30.0), shown * 1.005).time, time)
+
+
+@pytest.mark.parametrize(("stated", "meant"), [(29.97, 30000 / 1001), (23.98, 24000 / 1001)])
+def test_a_rate_that_is_given_counts_exactly(stated: float, meant: float) -> None:
+    found = counted_at(make(np.arange(18_000) / round(meant), float(round(meant))), stated)
+    assert found.fps == meant
+    np.testing.assert_allclose(found.time, np.arange(18_000) / meant)

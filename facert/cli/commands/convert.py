@@ -48,10 +48,12 @@ def command(
         file_option("Labels from another file, by its column frame or by time.", "--poses"),
     ] = None,
     in_fps: Annotated[
-        float | None, option("Frames a second of IN, if it states none.", min=1e-3)
+        float | None,
+        option("Frames a second of IN, whatever it states: frames are counted anew.", min=1e-3),
     ] = None,
     fps: Annotated[
-        float | None, option("Frames a second of OUT: resampled by time.", min=1e-3)
+        float | None,
+        option("Frames a second of OUT: resampled by time, every frame of that rate.", min=1e-3),
     ] = None,
     in_units: Annotated[str, option("Unit of IN, instead of the one it states.")] = "",
     units: Annotated[
@@ -59,7 +61,9 @@ def command(
     ] = "",
     in_up_axis: Annotated[str, option("The axis up in IN, instead of the one it states.")] = "",
     up_axis: Annotated[str, option("The axis up in OUT: y, z or x; turned.")] = "",
-    start_timecode: Annotated[str, option("Of the first frame, HH:MM:SS:FF.")] = "",
+    start_timecode: Annotated[
+        str, option("Of the first frame, HH:MM:SS:FF; drop-frame HH:MM:SS;FF.")
+    ] = "",
     rig_path: RIG = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
@@ -93,6 +97,6 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(kind, target, shapes, in_fps or fps, rig_path)
+    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path)
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

@@ -33,6 +33,7 @@ class Wanted:
     target: str | None = None
     shapes: str | None = None
     fps: float | None = None
+    or_fps: float | None = None
     rig: Path | None = None
 
 
@@ -54,7 +55,8 @@ def convert_file(
 def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool) -> str:
     of_morphs = "morphs" in require_output(output, overwrite, *KINDS).write
     if holds_mesh_sequence(source):
-        return _convert_sequence(source, output, changes, overwrite)
+        plain = changes == Changes() and not wanted.fps
+        return _convert_sequence(source, output, plain, overwrite)
     found = _read(source, output, wanted, changes)
     with reading(source):
         found = converted(found, changes)
@@ -82,13 +84,14 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
     """The take or the rig of a file; of one with both, the take where only that makes sense."""
     kind = wanted.kind
     no_rig = not require_output(output, True, *KINDS).write.keys() & {"rig", "morphs"}
-    if kind is None and (wanted.rig or changes.of_frames or no_rig):
+    if kind is None and (wanted.rig or wanted.fps or changes.of_frames or no_rig):
         kind = "take"
-    return formats.read_any(source, wanted.target, wanted.shapes, wanted.fps, kind)
+    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
+    return formats.read_any(source, *options)
 
 
-def _convert_sequence(source: Path, output: Path, changes: Changes, overwrite: bool) -> str:
-    if changes != Changes():
+def _convert_sequence(source: Path, output: Path, plain: bool, overwrite: bool) -> str:
+    if not plain:
         expected, found = "none that change a take", "a mesh sequence"
         raise InputError("options", expected, found, "Leave them out.", str(source))
     require_output(output, overwrite, "morphs")
