@@ -43,10 +43,7 @@ class Alignment:
             if text
         ]
         more = f" (and {len(self.pairs) - 1} more)" if len(self.pairs) > 1 else ""
-        return (
-            f"names matched without {' and '.join(removed)}: {one!r} is {other!r}{more}; "
-            "rename them (facert convert --map) if they are not the same"
-        )
+        return f"names matched without {' and '.join(removed)}: {one!r} is {other!r}{more}"
 
 
 def find_alignment(

@@ -116,7 +116,8 @@ class NameIndex:
     def __init__(self, names: Sequence[str], aligned: Alignment | None = None) -> None:
         self._names = names
         self._whole = _Spellings(dict(enumerate(names)))
-        self._aligned = aligned
+        self.aligned = aligned
+        """What is seen through, if anything."""
         removed = NONE if aligned is None else aligned.of_among
         cores = {place: removed.core(name) for place, name in enumerate(names) if aligned}
         self._cores = _Spellings({place: core for place, core in cores.items() if core})
@@ -148,7 +149,7 @@ class NameIndex:
         if aligned is None or len(aligned.pairs) <= found:
             return plain
         if not quiet:
-            log.info("%s", aligned.text(wanted, names))
+            log.info("%s; if that is wrong, facert convert --map", aligned.text(wanted, names))
         return cls(names, aligned)
 
     def find(self, name: str) -> int | None:
@@ -180,7 +181,7 @@ class NameIndex:
 
     def _readings(self, name: str) -> Iterator[tuple[_Spellings, str]]:
         """A name as it is to be looked up, and where: at first without what is seen through."""
-        core = None if self._aligned is None else self._aligned.of_wanted.core(name)
+        core = None if self.aligned is None else self.aligned.of_wanted.core(name)
         if core is not None:
             yield self._cores, core
         yield self._whole, name

@@ -29,6 +29,8 @@ class Observed:
     """Seconds on the sender's clock."""
     identity: bytes | None = None
     """The same for two frames only when one is a copy of the other."""
+    known: bool = True
+    """Whether any of the names that it brought is known; else all values are NaN."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,8 @@ class Counters:
     """Frames for which there is no finite pose."""
     hidden: int = 0
     """Frames in which the sender saw no face."""
+    unknown: int = 0
+    """Frames that brought values, but none under a name that is known."""
     late: int = 0
     """Packets that came twice, after a newer one, or from a second sender."""
     bad: int = 0
@@ -94,6 +98,10 @@ class Decoder(Protocol):
     def rehearse(self, packet: bytes) -> None:
         """Decode a packet again, without effect, so that code and data are cached."""
         self.decode(packet)
+
+    def forget(self) -> None:
+        """Forget what came so far: the sender was silent, or another one speaks."""
+        return
 
 
 class Encoder(Protocol):

@@ -1,7 +1,8 @@
 """Packets of iFacialMocap: text, ``name-INT|...|=head#x,y,z,...|``, names in any order.
 
-Weights are whole hundredths; the angles come in another convention than Live Link Face's, in
-degrees, and are left out.
+Weights are whole hundredths; a shape that a packet does not bring is as it was. No face was seen
+with ``trackingStatus-0``. The angles come in another convention than Live Link Face's, in degrees,
+and are left out.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
 
 _FIELD = re.compile(r"([A-Za-z_]{1,40})[-&](-?\d{1,4})")
 _LEAST = len(ARKIT_SHAPES) // 2
+_STATUS = "trackingStatus"
 _INDEX = NameIndex(ARKIT_SHAPES)
 
 
@@ -27,6 +29,11 @@ class IFacialMocapDecoder(Decoder):
     def __init__(self) -> None:
         # Spellings are few and fixed, and folding one takes microseconds.
         self._spelled: dict[str, int | None] = {}
+        self.forget()
+
+    def forget(self) -> None:
+        """See `facert.live.frames.Decoder`."""
+        self._held = np.full(len(ARKIT_SHAPES), np.nan)
 
     def decode(self, packet: bytes) -> Observed | None:
         """The frame of a packet; see `facert.live.frames.Decoder`."""
@@ -34,13 +41,18 @@ class IFacialMocapDecoder(Decoder):
             text = packet.decode("ascii")
         except UnicodeDecodeError as error:
             raise BadPacketError("not plain text") from error
-        values = np.full(len(ARKIT_SHAPES), np.nan)
-        for name, number in _FIELD.findall(text.partition("=")[0]):
+        fields = dict(_FIELD.findall(text.partition("=")[0]))
+        if fields.get(_STATUS) == "0":
+            self.forget()
+            return Observed(self._held)
+        values = self._held.copy()
+        for name, number in fields.items():
             place = self._place(name)
             if place is not None:
                 values[place] = int(number) / 100.0
-        if np.isfinite(values).sum() < _LEAST:
+        if not fields or np.isfinite(values).sum() < _LEAST:
             raise BadPacketError("not iFacialMocap")
+        self._held = values
         return Observed(values)
 
     def _place(self, name: str) -> int | None:

@@ -23,6 +23,8 @@ BUFFER = 2**22
 AT_ONCE = 256
 AT_MOST = 0.005
 """Packets, and seconds, before frames are mapped: a flood must not prevent that."""
+FORGOTTEN = 0.5
+"""Seconds of silence after which values that are not sent again are not observed any longer."""
 LOGGED = 5
 """Bad packets that are logged: a flood must not fill the terminal."""
 _LARGEST = 2**16
@@ -60,6 +62,7 @@ class UdpReceiver:
         self.start_timecode = ""
         self._socket, self._decoder, self._order = listening, decoder, Order()
         self._latest = b""
+        self._host, self._silent = "", 0.0
         self._socket.setblocking(False)
         with suppress(OSError):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
@@ -77,7 +80,9 @@ class UdpReceiver:
     def wait(self, seconds: float) -> list[Frame]:
         """The frames that have come, oldest first; after so many seconds also none."""
         frames: list[Frame] = []
+        begun = time.perf_counter()
         if not select.select([self._socket], [], [], seconds)[0]:
+            self._silent += time.perf_counter() - begun
             return frames
         end = time.perf_counter() + AT_MOST
         for packet, host, arrived in self._waiting():
@@ -113,6 +118,7 @@ class UdpReceiver:
         if not self._order.admits(host, arrived):
             self.counters.late += 1
             return None
+        self._forget_after_silence(host)
         try:
             observed = self._decoder.decode(packet)
         except BadPacketError as error:
@@ -127,6 +133,15 @@ class UdpReceiver:
             return None
         return self._seen(observed, placed, arrived)
 
+    def _forget_after_silence(self, host: str) -> None:
+        """Nothing that came before a silence, or from another sender, is held any longer.
+
+        A pause of this process is no silence: packets wait meanwhile.
+        """
+        if host != self._host or self._silent >= FORGOTTEN:
+            self._decoder.forget()
+        self._host, self._silent = host, 0.0
+
     def _count_bad(self, packet: bytes, host: str, error: BadPacketError) -> None:
         """Count a bad packet, and log it unless there were many."""
         self.counters.bad += 1
@@ -138,6 +153,9 @@ class UdpReceiver:
     def _seen(self, observed: Observed, placed: float, arrived: float) -> Frame | None:
         """The frame, unless nothing was seen in it."""
         first = not self.counters.received
+        if not observed.known:
+            self.counters.unknown += 1
+            return None
         if not _count_seen(observed.values, self.counters):
             return None
         if first and self._decoder.from_midnight and observed.stamp is not None:

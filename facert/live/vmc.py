@@ -8,39 +8,43 @@
 ``/facert/frame f``             the frame is complete, and the sender's clock
 ==============================  =====================================================
 
-What a frame does not bring counts as not observed.
+Some senders send only what changed: what a frame does not bring is as it was. What never came is
+not observed.
 """
 
 from __future__ import annotations
 
+import logging
 import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import NameIndex
 from facert.data.take import SourceKind
 from facert.live.frames import BadPacketError, Decoder, Observed, frame_pattern
 from facert.live.osc import Bundles, Message, PacketTemplates, message, parse
+from facert.live.stream_names import StreamNames
+
+log = logging.getLogger("facert")
 
 _VMC = "/VMC/"
 _VALUE, _CLOCK, _APPLY = "/VMC/Ext/Blend/Val", "/VMC/Ext/T", "/VMC/Ext/Blend/Apply"
 _FRAME = "/frame"
 _NOT_IN_ADDRESS = re.compile(r"[\s#*,/?\[\]{}]")
-_MOST_SPELLINGS = 4096
+_ROWS = 128
+_ENDLESS = 500  # Values without the end of a frame
 
 
 @dataclass(frozen=True, eq=False)
 class _Use:
     """The use of a datagram's numbers, as far as they belong to one frame."""
 
-    columns: IntArray
+    cells: IntArray
     numbers: IntArray
-    """`columns` are where values belong, `numbers` which of the numbers they are, (k,)."""
+    """`cells` are where values belong, `numbers` which of the numbers they are, (k,)."""
     clock: slice | None
     end: slice | None
     """The numbers of the sender's `clock`, and of the message that is the frame's `end`; None where
@@ -64,9 +68,15 @@ class OscDecoder(Decoder):
     def __init__(self, names: Sequence[str], kind: SourceKind, units: str = "") -> None:
         self.pattern = frame_pattern(names, kind, units)
         self._numbers = 3 if kind == "markers" else 1
-        self._place = lru_cache(_MOST_SPELLINGS)(NameIndex(names).find)
-        self._empty = np.full((len(names), self._numbers), np.nan)
-        self._values = self._empty.copy()
+        self._reported = self._ended = False
+        self._endless = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """See `facert.live.frames.Decoder`."""
+        self._names = StreamNames(self.pattern.source.names)
+        # What came last under each name of the stream; the last row, never filled, is for absent
+        self._held = np.full((_ROWS, self._numbers), np.nan)
         self._stamp: float | None = None
         self._templates: PacketTemplates[list[_Use]] = PacketTemplates()
 
@@ -76,13 +86,14 @@ class OscDecoder(Decoder):
         if found is None:
             messages = parse(packet)
             numbers = np.array([number for one in messages for number in one.numbers], np.float64)
+            if not np.isfinite(numbers).all():
+                raise BadPacketError("NaN or infinity")
             uses = self._uses(messages)
+            self._templates.remember(packet, messages, uses)
         else:
             uses, numbers = found
-        if not np.isfinite(numbers).all():
-            raise BadPacketError("NaN or infinity")
-        if found is None:
-            self._templates.remember(packet, messages, uses)
+            if not np.isfinite(numbers).all():
+                raise BadPacketError("NaN or infinity")
         observed = None
         for use in uses:
             observed = self._fill(use, numbers) or observed
@@ -94,22 +105,43 @@ class OscDecoder(Decoder):
 
     def _fill(self, use: _Use, numbers: FloatArray) -> Observed | None:
         """The frame that a datagram's numbers complete, if they do."""
-        self._values.reshape(-1)[use.columns] = numbers[use.numbers]
+        self._held.reshape(-1)[use.cells] = numbers[use.numbers]
         if use.clock is not None:
             self._stamp = _first(numbers[use.clock])
         if use.end is None:
+            self._warn_if_endless(len(use.cells))
             return None
+        self._ended = True
+        self._names.settle()
+        values = self._held[self._names.rows]
+        values = values if self._numbers == 3 else values[:, 0]
         stamp = _first(numbers[use.end])
-        stamp = self._stamp if stamp is None else stamp
-        values = self._values if self._numbers == 3 else self._values[:, 0]
+        stamp, self._stamp = self._stamp if stamp is None else stamp, None
         identity = None if stamp is None else struct.pack("d", stamp) + values.tobytes()
-        self._values, self._stamp = self._empty.copy(), None
-        return Observed(values, stamp=stamp, identity=identity)
+        return Observed(values, stamp=stamp, identity=identity, known=self._is_known())
+
+    def _is_known(self) -> bool:
+        """Whether a name of the stream is known, or there is none; the first time, log others."""
+        if not self._names.count:
+            return True
+        if not self._reported:
+            self._names.report()
+            self._reported = True
+        return bool((self._names.rows >= 0).any())
+
+    def _warn_if_endless(self, values: int) -> None:
+        """Warn once about a sender that never completes a frame."""
+        if self._ended:
+            return
+        self._endless += values
+        if self._endless >= _ENDLESS:
+            self._ended = True
+            log.warning("values come, but nothing completes a frame: send %s or /frame", _APPLY)
 
     def _uses(self, messages: Sequence[Message]) -> list[_Use]:
         """The use of the messages' numbers, one for each frame that they belong to."""
         uses: list[_Use] = []
-        columns: list[int] = []
+        cells: list[int] = []
         numbers: list[int] = []
         clock, count = None, 0
         for position, one in enumerate(messages, 1):
@@ -118,22 +150,27 @@ class OscDecoder(Decoder):
             ends = one.address == _APPLY or one.address.endswith(_FRAME)
             if one.address == _CLOCK:
                 clock = own
-            elif not ends and (place := self._wanted(one)) is not None:
-                columns += range(place * self._numbers, (place + 1) * self._numbers)
+            elif not ends and (row := self._row(one)) is not None:
+                cells += range(row * self._numbers, (row + 1) * self._numbers)
                 numbers += range(own.start, own.stop)
             if ends or position == len(messages):
-                found = np.array(columns, np.int64), np.array(numbers, np.int64)
+                found = np.array(cells, np.int64), np.array(numbers, np.int64)
                 uses.append(_Use(*found, clock, own if ends else None))
-                columns, numbers, clock = [], [], None
+                cells, numbers, clock = [], [], None
         return uses
 
-    def _wanted(self, one: Message) -> int | None:
-        """Index at which a message's numbers belong; None if nowhere."""
+    def _row(self, one: Message) -> int | None:
+        """Row at which a message's numbers belong; None if nowhere."""
         if len(one.numbers) != self._numbers:
             return None
         if one.address.startswith(_VMC):
-            return self._place(one.texts[0] if one.address == _VALUE and one.texts else "")
-        return self._place(one.address.rpartition("/")[2])
+            path, name = "", one.texts[0] if one.address == _VALUE and one.texts else ""
+        else:
+            path, _, name = one.address.rpartition("/")
+        row = self._names.row(name, path) if name else None
+        if row is not None and row >= len(self._held) - 1:
+            self._held = np.vstack([self._held, np.full_like(self._held, np.nan)])
+        return row
 
 
 def _first(numbers: FloatArray) -> float | None:

@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 from pylivelinkface import FaceBlendShape, PyLiveLinkFace
 from pythonosc.dispatcher import Dispatcher
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message_builder import OscMessageBuilder
 from pythonosc.osc_server import BlockingOSCUDPServer
 
 import facert as api
@@ -244,3 +246,57 @@ def test_from_a_phone_made_of_another_library_to_a_character_in_a_third(files, t
     columns = [found.source.names.index(name) for name in SHAPES]
     distance = np.abs(found.source.values[:, None, columns] - np.array(sent)).max(axis=2)
     assert distance.min(axis=1).max() < 1e-6
+
+
+def vmc_frames(weights, names, every=False):
+    """Datagrams of a performer made of another library that sends what changed, or everything."""
+    last = [None] * len(names)
+    for row in weights:
+        bundle = OscBundleBuilder(IMMEDIATELY)
+        for name, value, before in zip(names, row, last, strict=True):
+            if every or value != before:
+                one = OscMessageBuilder("/VMC/Ext/Blend/Val")
+                one.add_arg(name)
+                one.add_arg(float(value))
+                bundle.add_content(one.build())
+        bundle.add_content(OscMessageBuilder("/VMC/Ext/Blend/Apply").build())
+        last = row
+        yield bundle.build().dgram
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("prefix", ["", "Face1:blendShape1."])
+def test_what_a_performer_does_not_send_again_stays_as_it_was(files, take, tmp_path, prefix):
+    weights = np.round(take.source.values[:40], 1)
+    weights[20:] = weights[20]  # the face holds still: nothing but the end of each frame is sent
+    recorded = tmp_path / "in.h5"
+    with session(
+        "--in", "vmc:0", "--out", f"csv:{tmp_path / 'out.csv'}", "-m", files[1],
+        "--record", recorded, "--json",
+    ) as (process, port), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:  # fmt: skip
+        for raw in vmc_frames(weights, [f"{prefix}{name}" for name in SHAPES]):
+            sender.sendto(raw, ("127.0.0.1", port))
+            time.sleep(0.005)
+        time.sleep(0.2)
+        facts = summary(process)
+    assert (facts["received"], facts["hidden"], facts["unknown"], facts["bad"]) == (40, 0, 0, 0)
+    found = api.read_take(recorded).source
+    assert found.names == SHAPES
+    np.testing.assert_allclose(found.values, weights, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_names_that_the_model_does_not_know_are_reported(files):
+    names = [f"wobble{letter}" for letter in "ABCDEFGH"]
+    with session(
+        "--in", "vmc:0", "--out", "vmc", "-m", files[1], "--frames", 5
+    ) as (process, port), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:  # fmt: skip
+        for raw in vmc_frames(np.eye(8), names):
+            sender.sendto(raw, ("127.0.0.1", port))
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE)
+    expected = "names unknown: wobbleA, wobbleB, wobbleC, wobbleD, wobbleE and 3 more"
+    assert err.count(expected) == 1
+    assert "8 with unknown names" in out
+    assert "without a face" not in out

@@ -39,3 +39,18 @@ def test_a_shape_that_is_not_sent_is_not_observed():
 def test_random_bytes_are_refused(raw):
     with pytest.raises(BadPacketError):
         IFacialMocapDecoder().decode(raw)
+
+
+def test_what_a_packet_does_not_bring_is_as_it_was_until_the_face_is_lost():
+    decoder = IFacialMocapDecoder()
+    decoder.decode(packet())
+    observed = decoder.decode(b"trackingStatus-1|jawOpen-77|=head#1,2,3|")
+    expected = np.arange(52) / 100
+    expected[ARKIT_SHAPES.index("jawOpen")] = 0.77
+    np.testing.assert_allclose(observed.values, expected)
+    with pytest.raises(BadPacketError):
+        decoder.decode(b"no such thing")
+    lost = decoder.decode(b"trackingStatus-0|jawOpen-77|=head#1,2,3|")
+    assert np.isnan(lost.values).all()
+    with pytest.raises(BadPacketError):  # too few to be sure that it is iFacialMocap
+        decoder.decode(b"jawOpen-77|=head#1,2,3|")

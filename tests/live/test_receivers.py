@@ -151,3 +151,67 @@ def test_frames_of_a_take_that_saw_nothing_are_passed_over(make_take):
         frames += player.wait(1.0)
     assert len(frames) == 7
     assert (player.counters.received, player.counters.hidden) == (7, 3)
+
+
+NAMES = ("jawOpen", "browUp", "mouthSmile")
+
+
+@pytest.fixture
+def osc(monkeypatch):
+    """A receiver of OSC, and a socket that sends to it."""
+    monkeypatch.setattr("facert.live.order.SILENCE", 0.0)
+    opened = open_receiver(Address("osc", "", 0), "127.0.0.1", frame_pattern(NAMES))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", opened.port))
+        yield opened, sender
+    opened.close()
+
+
+def next_frame(opened, sender, *messages):
+    """The frame that these messages complete, if any."""
+    for raw in (*messages, message("/x/frame")):
+        sender.send(raw)
+    before, frames = sum(vars(opened.counters).values()), []
+    while sum(vars(opened.counters).values()) == before:
+        frames += opened.wait(5.0)
+    return frames[0] if frames else None
+
+
+def test_values_are_held_while_packets_arrive_and_not_over_a_silence(osc, monkeypatch):
+    opened, sender = osc
+    first = next_frame(opened, sender, message("/x/jawOpen", 0.5), message("/x/browUp", 0.25))
+    time.sleep(0.6)  # a pause of this process is no silence
+    second = next_frame(opened, sender, message("/x/browUp", 0.75))
+    np.testing.assert_array_equal(first.values, [0.5, 0.25, np.nan])
+    np.testing.assert_array_equal(second.values, [0.5, 0.75, np.nan])
+    monkeypatch.setattr("facert.live.receivers.FORGOTTEN", 0.1)
+    assert not opened.wait(0.15)
+    assert next_frame(opened, sender) is None
+    assert opened.counters.hidden == 1
+    third = next_frame(opened, sender, message("/x/mouthSmile", 1.0))
+    np.testing.assert_array_equal(third.values, [np.nan, np.nan, 1.0])
+
+
+def test_lost_packets_leave_the_values_that_came_last(osc):
+    opened, sender = osc
+    rng = np.random.default_rng(0)
+    last, held = np.full(3, np.nan), np.full(3, np.nan)
+    for _ in range(50):
+        row = rng.integers(0, 3, 3) / 2
+        sent = []
+        for k in np.flatnonzero(row != last):
+            if rng.random() < 0.7:
+                sent.append(message(f"/x/{NAMES[k]}", float(row[k])))
+                held[k] = row[k]
+        last = row
+        frame = next_frame(opened, sender, *sent)
+        if frame is not None:
+            np.testing.assert_array_equal(frame.values, held)
+    assert np.isfinite(held).all()
+
+
+def test_frames_under_unknown_names_are_counted_apart(osc, caplog):
+    opened, sender = osc
+    assert next_frame(opened, sender, message("/x/other", 0.5), message("/x/more", 0.5)) is None
+    assert (opened.counters.unknown, opened.counters.hidden) == (1, 0)
+    assert "names unknown: other, more; the model knows jawOpen, browUp, mouthSmile" in caplog.text

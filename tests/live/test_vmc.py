@@ -1,5 +1,6 @@
 import math
 import struct
+import unicodedata
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from facert.live.frames import BadPacketError, Observed
 from facert.live.osc import MOST_ALIKE, MOST_LENGTHS, PacketTemplates, message, parse
+from facert.live.stream_names import MOST
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 NAMES = ("jawOpen", "mouthSmileLeft", "Brow Up")
@@ -83,12 +85,17 @@ def test_a_performer_that_sends_single_messages_or_bundles_is_understood():
         assert found.stamp == 7.25
 
 
-def test_what_a_frame_does_not_bring_is_not_observed():
+def test_what_a_frame_does_not_bring_is_as_it_was_and_what_never_came_not_observed():
     decoder = weights()
     first = feed(decoder, message("/any/jawOpen", 0.5), message("/any/frame", 0.0))
     second = feed(decoder, message("/any/mouthSmileLeft", 0.25), message("/any/frame", 0.1))
     np.testing.assert_array_equal(first.values, [0.5, np.nan, np.nan])
-    np.testing.assert_array_equal(second.values, [np.nan, 0.25, np.nan])
+    np.testing.assert_array_equal(second.values, [0.5, 0.25, np.nan])
+    third = feed(decoder, message("/any/frame", 0.2))
+    np.testing.assert_array_equal(third.values, second.values)
+    np.testing.assert_array_equal(first.values, [0.5, np.nan, np.nan])  # a frame is its own
+    decoder.forget()
+    assert np.isnan(feed(decoder, message("/any/frame", 0.3)).values).all()
 
 
 def test_markers_have_three_numbers():
@@ -171,9 +178,11 @@ def test_datagrams_that_came_before_are_understood_as_at_first(shapes, order, ba
 def test_a_rehearsal_leaves_a_frame_in_parts_as_it_is():
     decoder, packets = weights(CONTROLS), VmcEncoder(CONTROLS).encode(POSE, 1.0)
     feed(decoder, *packets)
-    decoder.decode(packets[0])
-    decoder.rehearse(packets[-1])
-    assert np.isnan(feed(decoder, message("/VMC/Ext/Blend/Apply")).values).any()
+    first, *_, last = VmcEncoder(CONTROLS).encode(POSE + 1.0, 2.0)
+    decoder.decode(first)
+    decoder.rehearse(last)
+    values = feed(decoder, message("/VMC/Ext/Blend/Apply")).values
+    np.testing.assert_allclose(values[[0, -1]], POSE[[0, -1]] + [1.0, 0.0], atol=1e-6)
 
 
 def bundle(*messages):
@@ -195,3 +204,124 @@ def test_a_performers_datagrams_are_remembered_and_a_flood_of_others_is_not():
         decoder.decode(bundle(LONG, message(f"/flood{number:03}", float(number))))
     assert len(known) == MOST_LENGTHS
     assert max(map(len, known.values())) == MOST_ALIKE
+
+
+PREFIXES = ["Face1:blendShape1.", "blendShapes.", "BS_", "CTRL_expressions_", "Anna/"]
+APPLY = message("/VMC/Ext/Blend/Apply")
+MANY = ("jawOpen", "mouthSmileLeft", "browInnerUp", "eyeBlink_R")
+
+
+def values(names, number=0.0):
+    return [message("/VMC/Ext/Blend/Val", name, k / 4 + number) for k, name in enumerate(names)]
+
+
+@pytest.mark.parametrize("prefix", PREFIXES)
+@pytest.mark.parametrize("bundled", [True, False])
+def test_a_prefix_of_a_stream_is_seen_through_from_the_first_frame_on(prefix, bundled, caplog):
+    caplog.set_level("INFO")
+    names = [f"{prefix}{name}" for name in (*MANY, "tongueOut")]
+    for decoder in (weights(MANY), weights([f"Kopf_{name}" for name in MANY])):
+        for number in (0.0, 1.0, 2.0):
+            sent = [*values(names, number), APPLY]
+            observed = feed(decoder, bundle(LONG, *sent)) if bundled else feed(decoder, *sent)
+            np.testing.assert_array_equal(observed.values, np.arange(4) / 4 + number)
+            assert observed.known
+    lines = [record.getMessage() for record in caplog.records if "prefix" in record.getMessage()]
+    assert len(lines) == 2
+    assert all(f"the prefix '{prefix}'" in line for line in lines)
+
+
+def test_names_of_a_prefix_may_come_one_by_one():
+    decoder = weights(MANY)
+    for count in range(1, 5):
+        sent = values([f"ref_{name}" for name in MANY])[count - 1]
+        observed = feed(decoder, sent, APPLY)
+    np.testing.assert_array_equal(observed.values, np.arange(4) / 4)
+
+
+def test_names_that_nobody_knows_are_named_once(caplog):
+    decoder = weights(MANY)
+    for _ in range(3):
+        observed = feed(decoder, *values([f"{letter}{letter}" for letter in "abcdefgh"]), APPLY)
+        assert not observed.known
+        assert np.isnan(observed.values).all()
+    expected = "names unknown: aa, bb, cc, dd, ee and 3 more; the model knows jawOpen, mouthSmile"
+    assert caplog.text.count(expected) == 1
+    assert feed(weights(MANY), APPLY).known  # it brings nothing: no face
+
+
+@pytest.mark.parametrize("first", ["Anna:", "/Anna/"])
+def test_two_subjects_in_a_stream_are_never_mixed(first, caplog):
+    decoder = weights(MANY)
+    if first == "Anna:":
+        anna, ben = (values([f"{who}:{name}" for name in MANY], k) for k, who in enumerate("AB"))
+    else:
+        anna, ben = (
+            [message(f"/{who}/{name}", k / 4 + number) for k, name in enumerate(MANY)]
+            for number, who in enumerate("AB")
+        )
+    one = feed(decoder, *anna, APPLY)
+    two = feed(decoder, *ben, APPLY)
+    np.testing.assert_array_equal(one.values, np.arange(4) / 4)
+    np.testing.assert_array_equal(two.values, one.values)
+    assert caplog.text.count("WARNING") == 1
+    both = feed(weights(MANY), *anna, *ben, APPLY)
+    assert both.known == (first != "Anna:")
+    if first == "Anna:":
+        assert "those of two, 'A:*' and 'B:*': send those of one" in caplog.text
+    else:
+        np.testing.assert_array_equal(both.values, one.values)
+    decoder.forget()
+    np.testing.assert_array_equal(feed(decoder, *ben, APPLY).values, np.arange(4) / 4 + 1.0)
+
+
+@pytest.mark.parametrize("form", ["NFC", "NFD"])
+def test_forms_of_unicode_in_a_stream_are_one_name(form):
+    names = ["sourcilLevéGauche", "Ärger", "眉上"]
+    sent = values([unicodedata.normalize(form, name) for name in names])
+    np.testing.assert_array_equal(feed(weights(names), *sent, APPLY).values, [0.0, 0.25, 0.5])
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.data())
+def test_a_sender_on_change_is_read_as_one_that_sends_all(data):
+    """In any order, in any packets, for weights and for markers."""
+    kind = data.draw(st.sampled_from(["weights", "markers"]))
+    size = 3 if kind == "markers" else 1
+    frames = data.draw(st.lists(st.lists(st.integers(0, 2), min_size=4, max_size=4), min_size=1))
+    decoder, last = OscDecoder(MANY, kind), [None] * 4
+    for frame in frames:
+        changed = [k for k in range(4) if frame[k] != last[k]]
+        sent = [
+            message(f"/x/{MANY[k]}", *[float(frame[k])] * size)
+            for k in data.draw(st.permutations(changed))
+        ]
+        cut = data.draw(st.integers(0, len(sent)))
+        packets = [bundle(*part) for part in (sent[:cut], sent[cut:]) if part]
+        observed = feed(decoder, *packets, message("/x/frame"))
+        np.testing.assert_array_equal(observed.values.reshape(4, size)[:, 0], frame)
+        last = frame
+
+
+def test_a_marker_that_is_not_sent_is_held():
+    decoder = OscDecoder(("chin", "nose"), "markers")
+    feed(decoder, message("/m/nose", 1.0, 2.0, 3.0), message("/m/chin", 4.0, 5.0, 6.0))
+    observed = feed(decoder, message("/m/chin", 7.0, 8.0, 9.0), message("/m/frame"))
+    np.testing.assert_array_equal(observed.values, [[7.0, 8.0, 9.0], [1.0, 2.0, 3.0]])
+
+
+def test_values_that_no_message_completes_are_reported(caplog):
+    decoder = weights(MANY)
+    for number in range(300):
+        feed(decoder, *values(MANY, float(number)))
+    assert caplog.text.count("nothing completes a frame") == 1
+
+
+def test_a_flood_of_names_is_bounded():
+    decoder = weights(MANY)
+    for number in range(6000):
+        decoder.decode(message(f"/x/y{number}", 1.0))
+        if number % 100 == 0:
+            feed(decoder, *values(MANY), APPLY)
+    assert decoder._names.count == MOST
+    np.testing.assert_array_equal(feed(decoder, *values(MANY), APPLY).values, np.arange(4) / 4)

@@ -92,6 +92,7 @@ def _counts(counters: Counters) -> str:
     others = {
         "late or double": counters.late,
         "without a face": counters.hidden,
+        "with unknown names": counters.unknown,
         "without a pose": counters.failed,
         "not sent": counters.unsent,
         "refused by the receiver": counters.refused,
