@@ -1,8 +1,12 @@
 """Plain CSV tables with a header.
 
-A column ``time`` (seconds) or ``frame`` (numbers at the rate that is given) comes with columns
-``NAME.x NAME.y NAME.z`` (or ``NAME_x`` ...) for markers, or one column a weight. A blank cell was
-not observed. Written are the poses of a take, or else its source.
+A column of times (seconds, another unit, a date or a timecode) or of frame numbers comes with
+columns ``NAME.x NAME.y NAME.z`` (or spelled otherwise) for markers, or one column a weight. A blank
+cell was not observed. Written are the poses of a take, or else its source.
+
+Where a table of facert's own would be read otherwise, as with a control called ``frame``, its first
+cell states what the columns are: ``time (weights)`` or ``time (markers)``. Names and times are then
+exactly those of the file.
 """
 
 from __future__ import annotations
@@ -15,41 +19,63 @@ from pathlib import Path
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
-from facert.data.resampling import nominal_rate
+from facert.data.arrays import FloatArray
+from facert.data.columns import require_there
+from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_columns
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.lines import check_width, read_csv, read_header, to_numbers
+from facert.io.coordinates import markers_among
+from facert.io.guarded import read_text
+from facert.io.lines import check_width, parse_csv, read_header, to_numbers
 from facert.io.livelink import is_livelink, read_livelink
+from facert.io.table import Table, table_of_lines
+from facert.io.table_take import Reading, take_of_table, unlogged
 
-_COORDINATE = re.compile(r"(.+)[._]([xyz])", re.IGNORECASE)
+_MARKS = {"weights": "time (weights)", "markers": "time (markers)"}
+_LONGEST = max(map(len, _MARKS.values()))
+_NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 
 
-def read_csv_take(path: Path, fps: float | None = None) -> Take:
+def read_csv_take(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Take:
     """Read a CSV file by its header: one of Live Link Face, or else a table."""
     with reading(path):
-        livelink = is_livelink(read_header(path))
-    return read_livelink(path) if livelink else read_table(path, fps)
+        header = read_header(path)
+        if not is_livelink(header):
+            return read_table(path, fps, keep)
+        require_there(keep, header)
+        return read_livelink(path)
 
 
-def read_table(path: Path, fps: float | None = None) -> Take:
+def read_table(
+    path: Path, fps: float | None = None, keep: Sequence[str] = (), sparse: bool = False
+) -> Take:
     """Read a table as a take whose source is markers or weights.
 
-    `fps` is that of a column ``frame``; a column ``time`` needs none.
+    Parameters
+    ----------
+    fps : float, optional
+        The rate of a table that has frame numbers or no clock at all.
+    keep : sequence of str
+        Columns that are weights though they look like a clock, a counter or a flag.
+    sparse : bool
+        Whether the rows are poses of single frames: never markers, and far apart in time.
 
     Raises `InputError` naming the file and the line or column that is at fault.
     """
     with reading(path):
-        header, rows = read_csv(path)
-        check_width(rows, header)
-        clock = _clock_column(header)
-        columns = [column for column in range(len(header)) if column != clock]
-        names, order = _source_columns([header[column] for column in columns])
-        time, rate = _clock(to_numbers(rows, header, [clock])[:, 0], header[clock], fps)
-        values = to_numbers(rows, header, columns)[:, order]
-        source = Source(values if order.ndim == 1 else values.reshape(len(rows), -1, 3), names)
-        return Take(time=time, source=source, fps=rate)
+        text = read_text(path)
+        if _is_marked(text):
+            return _read_marked(text)
+        header, rows = parse_csv(text)
+        _require_names(header)
+        return take_of_table(table_of_lines(header, rows), Reading(fps, tuple(keep), sparse))
+
+
+def is_mixed(path: Path) -> bool:
+    """Whether columns of a table may be no weights: unless its first cell states what they are."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        return not _is_marked(file.read(2 * _LONGEST))
 
 
 def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
@@ -58,44 +84,76 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     names, values = named_columns(take)
-    body = io.StringIO()
-    np.savetxt(body, np.column_stack([take.time, values]), fmt="%.10g", delimiter=",")
+    body = _body(take.time, values)
+    markers = take.params is None and take.source.kind == "markers"
+    mark = _MARKS["markers" if markers else "weights"]
+    clock = "time" if _reads_back(names, body, markers) else mark
     with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerow(["time", *names])
-        file.write(body.getvalue().replace("nan", ""))
+        file.write(_header([clock, *names]) + body.replace("nan", ""))
 
 
-def _clock_column(header: Sequence[str]) -> int:
-    lower = [name.lower() for name in header]
-    for name in ("time", "frame"):
-        if name in lower:
-            return lower.index(name)
-    fix = "Add one; or name the columns as Live Link Face does."
-    raise InputError("header", "a column time (seconds) or frame", ", ".join(header[:4]), fix)
+def _is_marked(text: str) -> bool:
+    return text.lstrip('"').lower().startswith(tuple(_MARKS.values()))
 
 
-def _clock(values: FloatArray, column: str, fps: float | None) -> tuple[FloatArray, float]:
-    """Seconds and nominal rate of a column of seconds or of frame numbers."""
-    if column.lower() == "time":
-        return values, nominal_rate(values)
-    if fps is None:
-        fix = "Add a column time, or run facert convert with --in-fps."
-        raise InputError("column frame", "the rate of the frames", "none", fix)
-    return values / fps, fps
+def _read_marked(text: str) -> Take:
+    """A table whose first cell states what the others are."""
+    header, rows = parse_csv(text, stripped=False)
+    check_width(rows, header)
+    numbers = to_numbers(rows, header, range(len(header)))
+    time, values, names = numbers[:, 0], numbers[:, 1:], header[1:]
+    if header[0].lower() == _MARKS["markers"]:
+        found = markers_among(names, values, sure=True)
+        if found is None:
+            fix = f"Name them so, or write {_MARKS['weights']!r} first."
+            raise InputError("header", "NAME.x, NAME.y, NAME.z for all", header[1], fix)
+        return Take(time, Source(values[:, found.columns], found.names), fps=nominal_rate(time))
+    return Take(time, Source(values, names), fps=nominal_rate(time))
 
 
-def _source_columns(header: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:
-    """Names of the markers and their columns (M, 3); or names of the weights and theirs (D,)."""
-    found = [_COORDINATE.fullmatch(name) for name in header]
-    markers = list(dict.fromkeys(match[1] for match in found if match))
-    place = {(match[1], match[2].lower()): i for i, match in enumerate(found) if match}
-    whole = [name for name in markers if all((name, axis) in place for axis in "xyz")]
-    if not whole:
-        return tuple(header), np.arange(len(header))
-    if 3 * len(whole) != len(header):
-        in_markers = {place[name, axis] for name in whole for axis in "xyz"}
-        odd = next(name for i, name in enumerate(header) if i not in in_markers)
-        expected = "markers only, each with x, y and z"
-        fix = "Remove it: a take's source is markers or weights, not both."
-        raise InputError(f"column {odd}", expected, "another column", fix)
-    return tuple(whole), np.array([[place[name, axis] for axis in "xyz"] for name in whole])
+def _require_names(header: Sequence[str]) -> None:
+    """Refuse a first line of numbers."""
+    if all(map(_NUMBER.fullmatch, header)) and any("." in cell for cell in header):
+        found, fix = "numbers only", "Write the names of the columns into a first line."
+        raise InputError("header", "names of the columns", found, fix)
+
+
+def _body(time: FloatArray, values: FloatArray) -> str:
+    """The rows of a table; times are written in full where ten digits do not tell them apart."""
+    body = io.StringIO()
+    short = np.array([float(f"{one:.10g}") for one in (time[0], time[-1])])
+    close = np.abs(short - time[[0, -1]]).max() <= 1e-6 and (np.diff(time) > 1e-5).all()
+    formats = ["%.10g" if close else "%.17g", *["%.10g"] * values.shape[1]]
+    np.savetxt(body, np.column_stack([time, values]), fmt=formats, delimiter=",")
+    return body.getvalue()
+
+
+def _header(cells: Sequence[str]) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(cells)
+    return line.getvalue()
+
+
+def _reads_back(names: Sequence[str], body: str, markers: bool) -> bool:
+    """Whether a table of these columns is read as what it is without more in its header.
+
+    Weights may be read as poses as well.
+    """
+    numbers = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
+    expected = [name[:-2] for name in names[::3]] if markers else list(names)
+    try:
+        header, _ = parse_csv(_header(["time", *names]) + "0\n")
+        if header != ("time", *names):
+            return False
+        table = Table(header, numbers, {}, "row {}".format)
+        ways = [Reading()] if markers else [Reading(), Reading(sparse=True)]
+        with unlogged():
+            takes = [take_of_table(table, way) for way in ways]
+    except InputError:
+        return False
+    return all(
+        list(take.source.names) == expected
+        and np.array_equal(take.source.matrix, numbers[:, 1:], equal_nan=True)
+        and np.array_equal(take.time, numbers[:, 0])
+        for take in takes
+    )

@@ -8,6 +8,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Literal
 
+from facert.data.columns import learnable
 from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig
@@ -38,6 +39,7 @@ def read_any(
     fps: float | None = None,
     kind: TakeOrRig | None = None,
     or_fps: float | None = None,
+    keep: Sequence[str] = (),
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -53,6 +55,8 @@ def read_any(
         What to read of a file that can hold both, as glTF does; by default the rig.
     or_fps : float, optional
         Frames a second of a file that does not state it, where there is no `fps`.
+    keep : sequence of str
+        Columns of a table that are weights, though they look like a clock, a counter or a flag.
 
     Raises
     ------
@@ -73,9 +77,12 @@ def read_any(
         fix = "Leave it out: there is nothing to choose."
         raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
     fps = None if fps is None else standard_rate(fps)
-    options = {"target": target, "shapes": shapes, "fps": fps or or_fps}
+    options = {"target": target, "shapes": shapes, "fps": fps or or_fps, "keep": keep}
     taken = signature(reader).parameters.keys() & options.keys()
     read: Take | Rig = reader(path, **{name: options[name] for name in taken})
+    if isinstance(read, Take) and found.mixed and function(found.mixed)(path):
+        with reading(path):
+            read = learnable(read, keep)
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
 
@@ -92,7 +99,9 @@ def _has_targets(one: Format) -> bool:
     return "take" in one.read and "target" in signature(function(one.read["take"])).parameters
 
 
-def read_take_file(path: Path, target: str | None = None, fps: float | None = None) -> Take:
+def read_take_file(
+    path: Path, target: str | None = None, fps: float | None = None, keep: Sequence[str] = ()
+) -> Take:
     """Read a take from any format; see `read_any`.
 
     Raises
@@ -100,7 +109,7 @@ def read_take_file(path: Path, target: str | None = None, fps: float | None = No
     InputError
         Also when the file holds a rig.
     """
-    return require_take(read_any(path, target=target, fps=fps, kind="take"), path)
+    return require_take(read_any(path, target=target, fps=fps, kind="take", keep=keep), path)
 
 
 def require_take(found: Take | Rig, path: Path) -> Take:

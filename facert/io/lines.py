@@ -18,6 +18,8 @@ from facert.io.guarded import existing_file, read_text
 MAX_HEADER = 2**20
 SEPARATORS = ",;\t"
 
+# Quoted cells, in which separators do not count.
+_QUOTED = re.compile(r'"(?:[^"]|"")*"')
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 _COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 
@@ -50,14 +52,27 @@ def read_header(path: Path) -> tuple[str, ...]:
     """The cells of the first line, which shows the kind of a CSV file."""
     with existing_file(path).open(encoding="utf-8-sig", errors="replace") as file:
         line = file.readline(MAX_HEADER)
-    return tuple(cell.strip() for cell in line.split(_separator(line)))
+    separator = separator_of(line)
+    try:
+        cells = next(csv.reader([line.rstrip("\r\n")], delimiter=separator), [])
+    except csv.Error:  # whoever reads the rows says where
+        cells = line.split(separator)
+    return tuple(cell.strip() for cell in cells)
 
 
 def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
-    """Read a CSV file with a header; blank lines are skipped.
+    """Read a CSV file with a header; see `parse_csv`.
 
-    Where the header is separated by semicolons or tabs, as Excel does in much of Europe, so are
-    the rows, and their numbers may have decimal commas.
+    Raises `InputError` also when the file cannot be read.
+    """
+    return parse_csv(read_text(path))
+
+
+def parse_csv(text: str, stripped: bool = True) -> tuple[tuple[str, ...], list[Line]]:
+    """Parse a CSV text with a header, by default without blanks around its names.
+
+    Blank lines are skipped. Where the header is separated by semicolons or tabs, as Excel does in
+    much of Europe, so are the rows, and their numbers may have decimal commas.
 
     Returns
     -------
@@ -67,10 +82,10 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
     Raises
     ------
     InputError
-        When the file cannot be read, or has no header.
+        When there is no header, or no row.
     """
-    lines = read_text(path).splitlines()
-    separator = _separator(next(filter(str.strip, lines), ""))
+    lines = text.splitlines()
+    separator = separator_of(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
         rows = [Line(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
@@ -80,12 +95,14 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
     if len(rows) < 2:
         raise InputError("file", "a header and rows", plural(len(rows), "line"), "Export it again.")
     body = rows[1:] if separator == "," else with_points(rows[1:])
-    return tuple(cell.strip() for cell in rows[0].cells), body
+    header = rows[0].cells
+    return tuple(cell.strip() if stripped else cell for cell in header), body
 
 
-def _separator(header: str) -> str:
+def separator_of(header: str) -> str:
     """The separator that gives a header the most cells; the comma where two give as many."""
-    return max(SEPARATORS, key=header.count)
+    bare = _QUOTED.sub("", header)
+    return max(SEPARATORS, key=bare.count)
 
 
 def with_points(rows: list[Line]) -> list[Line]:

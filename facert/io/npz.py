@@ -117,6 +117,11 @@ def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
         return "rig" if "neutral" in archive and "faces" in archive else "take"
 
 
+def is_mixed(_path: Path) -> bool:
+    """Whether weights of a track may be a clock, a counter or a flag: of any, by who wrote it."""
+    return True
+
+
 def read_npz_take(path: Path, target: str | None = None, fps: float | None = None) -> Take:
     """Read a track; `fps` is for a file that does not state it.
 

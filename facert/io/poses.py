@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from facert.data.column_names import Role, role_of_name
+from facert.data.columns import require_there
 from facert.data.labelling import Poses, poses_of, predicted_poses
 from facert.data.rate import frames_shown, standard_rate
 from facert.data.resampling import counted_at
@@ -15,9 +18,12 @@ from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
+from facert.io.csv_table import is_mixed, read_table
 from facert.io.formats import read_any, require_take
-from facert.io.lines import check_width, read_csv, read_header, to_numbers
+from facert.io.lines import read_csv, read_header, to_numbers
 from facert.io.livelink import is_livelink
+from facert.io.table import table_of_lines
+from facert.io.table_take import controls_of
 
 log = logging.getLogger("facert")
 
@@ -27,21 +33,32 @@ _FRAME = "frame"
 _FRAMES = 5.0  # rows a second of a table, which are frames and not poses now and then
 
 
-def read_poses(path: Path, fps: float | None = None) -> Poses:
+def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Poses:
     """Read poses: of a CSV with a column ``frame``, its rows; else of a take, by their times.
 
-    `fps` is the rate of the recording, whatever the file states.
+    `fps` is the rate of the recording, whatever the file states. Columns of a table that are no
+    controls, such as a confidence, are left out, and the log names them; those in `keep` stay.
 
     Raises `InputError` when the file cannot be read, a row names no frame, there are no poses in
     it, or a model predicted them all.
     """
     path = Path(path)
     with reading(path):
-        if path.suffix.lower() == ".csv" and _names_frames(read_header(path)):
-            return replace(_read_numbered(path), where=str(path))
-        take = _at_rate(read_any(path, kind="take", or_fps=fps), path, fps)
-        _require_set(take, path)
-        return replace(poses_of(take), where=str(path))
+        if path.suffix.lower() == ".csv" and not is_livelink(header := read_header(path)):
+            poses = _read_table(path, header, fps, keep)
+        else:
+            take = _at_rate(read_any(path, kind="take", or_fps=fps, keep=keep), path, fps)
+            _require_set(take, path)
+            poses = poses_of(take)
+        return replace(poses, where=str(path))
+
+
+def _read_table(path: Path, header: Sequence[str], fps: float | None, keep: Sequence[str]) -> Poses:
+    """Poses of a table, by its column ``frame`` or else by time."""
+    place = _frame_column(header) if is_mixed(path) else None
+    if place is not None:
+        return _read_numbered(path, place, keep)
+    return poses_of(_at_rate(read_table(path, fps, keep, sparse=True), path, fps))
 
 
 def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
@@ -74,23 +91,23 @@ def _require_set(take: Take, path: Path) -> None:
         log.warning("%s: %s with a standard deviation: predicted, taken as set", path.name, poses)
 
 
-def _names_frames(header: tuple[str, ...]) -> bool:
+def _frame_column(header: Sequence[str]) -> int | None:
+    """The column that numbers the frames, unless there is one of seconds."""
     lower = [name.lower() for name in header]
-    return _FRAME in lower and "time" not in lower
+    if "time" in lower:
+        return None
+    numbering = (i for i, name in enumerate(header) if role_of_name(name) is Role.FRAME)
+    return lower.index(_FRAME) if _FRAME in lower else next(numbering, None)
 
 
-def _read_numbered(path: Path) -> Poses:
+def _read_numbered(path: Path, place: int, keep: Sequence[str]) -> Poses:
     header, rows = read_csv(path)
-    check_width(rows, header)
-    place = [name.lower() for name in header].index(_FRAME)
-    columns = [column for column in range(len(header)) if column != place]
+    require_there(keep, header)
+    table = table_of_lines(header, rows)
     numbers = to_numbers(rows, header, [place])[:, 0]
     odd = np.flatnonzero(~((numbers == np.rint(numbers)) & (np.abs(numbers) < MAX_FRAMES)))
     if len(odd):
         row = rows[odd[0]]
         raise row.error(header[place], "a frame's number, whole and from 0", repr(row.cells[place]))
-    return Poses(
-        names=tuple(header[column] for column in columns),
-        values=to_numbers(rows, header, columns),
-        frames=numbers.astype(np.int64),
-    )
+    names, values = controls_of(table, place, keep)
+    return Poses(names=names, values=values, frames=numbers.astype(np.int64))

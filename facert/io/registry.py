@@ -40,6 +40,8 @@ class Format:
     missing: Missing = ""
     """What stands for missing frames where a file is played row by row at its rate, so that rows
     have to be even: the frame before, or a row that says so; empty where rows have their times."""
+    mixed: str = ""
+    """From the path to whether columns of that file may be no weights: a clock, a flag."""
     about: str = ""
     """What writes such takes, for ``--help``."""
     reads: str = ""
@@ -75,6 +77,7 @@ FORMATS = (
         (".csv",),
         read={"take": "csv_table.read_csv_take"},
         write={"take": "csv_table.write_table"},
+        mixed="csv_table.is_mixed",
         about=" of Live Link Face or plain",
         reads="Live Link Face, or a table with a header: `time` or `frame`, `NAME.x NAME.y NAME.z` "
         "or weights; separated by commas, or by semicolons or tabs with decimal commas as well",
@@ -129,6 +132,7 @@ FORMATS = (
         read={"take": "npz.read_npz_take", "rig": "npz.read_npz_rig"},
         kind_of="npz.kind_of",
         targets="npz.targets_of",
+        mixed="npz.is_mixed",
         reads="tracks: `markers`, `marker_names`, `time`, `fps`, any targets `KEY` with "
         "`KEY_names` (choose with `--target KEY`); rigs: `neutral`, `faces`, `deltas`, `names`, "
         "or several `KEY_deltas`, `KEY_names` (choose with `--shapes KEY`)",

@@ -6,6 +6,7 @@ import logging
 from dataclasses import replace
 from typing import Any
 
+from facert.data.columns import warn_of_clocks
 from facert.data.labelling import predicted_poses
 from facert.data.normalisation import Normalisation
 from facert.data.take import Take
@@ -54,6 +55,7 @@ def train(
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
     require_known(settings)
     check_poses(take)
+    warn_of_clocks(take)
     data = training_data(take, settings)
     begin_at = None if start is None else _start(start, data)
     learned = learn(data, settings, monitor or Monitor(), begin_at)

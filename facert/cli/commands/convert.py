@@ -55,6 +55,10 @@ def command(
         float | None,
         option("Frames a second of OUT: resampled by time, every frame of that rate.", min=1e-3),
     ] = None,
+    keep: Annotated[
+        list[str] | None,
+        option("A column of IN to keep that looks like a clock, a counter or a flag; repeatable."),
+    ] = None,
     in_units: Annotated[str, option("Unit of IN, instead of the one it states.")] = "",
     units: Annotated[
         str, option("Unit of OUT: m, dm, cm, mm, in or ft; numbers are converted.")
@@ -72,7 +76,9 @@ def command(
 ) -> None:
     """Convert a take, a rig or a mesh sequence to another format.
 
-    Shapes are matched by name in any spelling; rows without a face are dropped and counted.
+    Shapes are matched by name in any spelling. Columns that are a clock, a counter, a confidence
+    or a flag are used as such, or left out and named, unless --keep names them. Rows without a face
+    are dropped and counted.
     A .csv or .json holds the poses when there are any, else the source. A .glb or .usd holds the
     shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
     does. What IN does not state of its rate, unit or axis is taken to be as OUT's.
@@ -89,7 +95,7 @@ def command(
     require_kept(todo, map_path, poses_path, rig_path)
     changes = Changes(
         names=read_toml(map_path) if map_path else {},
-        poses=read_poses(poses_path, in_fps) if poses_path else None,
+        poses=read_poses(poses_path, in_fps, keep or ()) if poses_path else None,
         fps=fps,
         in_units=in_units,
         units=units,
@@ -97,6 +103,6 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path)
+    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()))
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

@@ -35,6 +35,7 @@ class Wanted:
     fps: float | None = None
     or_fps: float | None = None
     rig: Path | None = None
+    keep: tuple[str, ...] = ()
 
 
 def convert_file(
@@ -86,7 +87,7 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
     no_rig = not require_output(output, True, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or wanted.fps or changes.of_frames or no_rig):
         kind = "take"
-    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
+    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps, wanted.keep)
     return formats.read_any(source, *options)
 
 

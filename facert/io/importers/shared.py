@@ -75,7 +75,7 @@ def _read_json(path: str) -> Curves:
 def _read_csv(path: str) -> Curves:
     with open(path, encoding="utf-8-sig", newline="") as file:
         header, *rows = [row for row in csv.reader(file) if row]
-    place = header.index("time")
+    place = next(i for i, name in enumerate(header) if name.split(" (")[0] == "time")
     time = [float(row[place]) for row in rows]
     values = {
         name: [float(row[column]) if row[column] else None for row in rows]

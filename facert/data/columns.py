@@ -1,0 +1,229 @@
+"""Columns beside the weights of a table: found by name and by shape, used or left out, and logged.
+
+A model that learns from a clock or a counter among its weights takes every frame for a new
+expression. Whatever reads a foreign table asks here which of its columns are weights.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.column_names import Role, is_letter, names_face, role_of_name
+from facert.data.names import fitting
+from facert.data.take import Source, Take
+from facert.data.text import plural
+from facert.errors import InputError
+
+log = logging.getLogger("facert")
+
+ENOUGH = 10
+"""Fewest rows that show a shape: a clock, a counter or a flag."""
+
+_WEIGHTS = 1.5  # no clock is told from a ramp of a weight within this range
+_BEYOND = 1e5
+_LINEAR = 1e-2  # of the range, by which a clock strays from a line
+_FEW = 4  # rows that copy the frames' numbers exactly
+_TWO_VALUED = 2  # more columns of two values than this are weights: lips of a puppet, visemes
+_LISTED = 12
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What of a table's columns is learned from."""
+
+    columns: IntArray
+    """Indices of the columns that are weights."""
+    absent: BoolArray
+    """Rows in which a flag states that there was no face, (T,)."""
+
+
+def weight_columns(
+    names: Sequence[str],
+    values: FloatArray,
+    time: FloatArray,
+    keep: Sequence[str] = (),
+    coordinates: Sequence[int] = (),
+    sparse: bool = False,
+) -> Weights:
+    """The weights among the columns of a table, and the rows without a face; the log has the rest.
+
+    Parameters
+    ----------
+    names : sequence of str, length D
+    values : array, shape (T, D)
+    time : array, shape (T,)
+        Seconds of the rows.
+    keep : sequence of str
+        Names, in any spelling or with wildcards, of columns that are weights whatever they look
+        like.
+    coordinates : sequence of int
+        Columns that are those of markers.
+    sparse : bool
+        The rows are single frames, of whose poses many have two values or rise steadily.
+    """
+    kept = {*coordinates, *(column for pattern in keep for column in fitting(pattern, names))}
+    roles = {
+        column: role
+        for column, role in roles_of(names, values, time, sparse).items()
+        if column not in kept
+    }
+    if len(roles) == len(names):  # A table of nothing else: somebody's controls are named so
+        roles = {}
+    _log_left_out(names, roles)
+    absent = _absent(names, values, roles)
+    left = [column for column in range(len(names)) if column not in roles]
+    return Weights(np.array(left, dtype=np.int64), absent)
+
+
+def roles_of(
+    names: Sequence[str], values: FloatArray, time: FloatArray, sparse: bool = False
+) -> dict[int, Role]:
+    """The columns (T, D) that are no weights, by name or else by shape; see `weight_columns`."""
+    named = {column: role_of_name(name) for column, name in enumerate(names)}
+    roles = {
+        column: role
+        for column, role in named.items()
+        if role is not None and (not is_letter(names[column]) or rises(values[:, column]))
+    }
+    nameless = [c for c, name in enumerate(names) if c not in roles and not names_face(name)]
+    if sparse:
+        copies = (c for c in nameless if _copies(values[:, c], time, _FEW, _WEIGHTS))
+        return roles | dict.fromkeys(copies, Role.CLOCK)
+    shaped = {column: _role_of_shape(values[:, column], time) for column in nameless}
+    flags = [c for c in nameless if len(names[c]) > 1 and _is_two_valued(values[:, c])]
+    roles |= {column: role for column, role in shaped.items() if role is not None}
+    return roles | (dict.fromkeys(flags, Role.FLAG) if len(flags) <= _TWO_VALUED else {})
+
+
+def rises(column: FloatArray) -> bool:
+    """Whether a column (T,) is observed everywhere, and each value is above the one before."""
+    return bool(np.isfinite(column).all() and (np.diff(column) > 0).all())
+
+
+def _role_of_shape(column: FloatArray, time: FloatArray) -> Role | None:
+    """A clock or a counter, if a column rises as one: beyond the range of weights, and steadily."""
+    observed = np.isfinite(column)
+    column, time = column[observed], time[observed]
+    if len(column) < ENOUGH or not (np.diff(column) > 0).all():
+        return None
+    span = column[-1] - column[0]
+    if span <= _WEIGHTS:
+        return None
+    if np.abs(column).min() > _BEYOND:
+        return Role.CLOCK
+    if (column == np.rint(column)).all():
+        steps = np.diff(column)
+        return Role.COUNTER if np.ptp(steps) == 0 or _is_line(column, time) else None
+    rows = np.arange(len(column), dtype=np.float64)
+    return Role.CLOCK if _is_line(column, time) or _is_line(column, rows) else None
+
+
+def _is_line(column: FloatArray, time: FloatArray, most: float = _LINEAR) -> bool:
+    """Whether a column (T,) is linear in time, to a part of its range."""
+    centred = time - time.mean()
+    total = float(centred @ centred)
+    if total == 0.0:
+        return False
+    level = column.mean()
+    slope = float(centred @ (column - level)) / total
+    strays = np.abs(column - level - slope * centred).max()
+    return bool(strays <= most * np.ptp(column))
+
+
+def _is_two_valued(column: FloatArray) -> bool:
+    observed = column[np.isfinite(column)]
+    both = (observed == 0.0).any() and (observed == 1.0).any()
+    return bool(len(observed) >= ENOUGH and both and np.isin(observed, (0.0, 1.0)).all())
+
+
+def _log_left_out(names: Sequence[str], roles: dict[int, Role]) -> None:
+    if not roles:
+        return
+    listed = [f"{names[column]!r} ({role.value})" for column, role in roles.items()]
+    more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    text = "left out, as no weights: %s%s; facert convert --keep NAME keeps one"
+    log.info(text, ", ".join(listed[:_LISTED]), more)
+
+
+def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) -> BoolArray:
+    """Rows (T,) in which a flag states that there was no face."""
+    absent = np.zeros(len(values), dtype=np.bool_)
+    for column, role in roles.items():
+        here = _rows_without(values[:, column], role)
+        if role_of_name(names[column]) is role and 0 < here.sum() < len(here):
+            log.info(
+                "%s without a face by %r: not observed",
+                plural(int((here & ~absent).sum()), "row"),
+                names[column],
+            )
+            absent |= here
+    return absent
+
+
+def _rows_without(column: FloatArray, role: Role) -> BoolArray:
+    """Rows in which a flag or a confidence is at its lowest: no face at all."""
+    observed = column[np.isfinite(column)]
+    if role is Role.ABSENCE:
+        return (
+            np.asarray(column == 1.0) if np.isin(observed, (0.0, 1.0)).all() else column != column
+        )
+    counts = role is Role.FLAG and bool((observed == np.rint(observed)).all())
+    if counts or role is Role.CONFIDENCE:
+        return np.asarray(column == 0.0)
+    return np.zeros(len(column), dtype=np.bool_)
+
+
+def learnable(take: Take, keep: Sequence[str] = ()) -> Take:
+    """A foreign take with its weights alone: see `weight_columns`. One of markers is as it was.
+
+    Raises `InputError` when a name to keep is not there.
+    """
+    source = take.source
+    if source.kind == "markers":
+        return take
+    found = weight_columns(source.names, source.values, take.time, keep)
+    if len(found.columns) == len(source.names) and not found.absent.any():
+        return take
+    values = source.values[:, found.columns].copy()
+    values[found.absent] = np.nan
+    return replace(take, source=Source(values, tuple(source.names[c] for c in found.columns)))
+
+
+def require_there(keep: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse to keep a column that is not there."""
+    for pattern in keep:
+        if not fitting(pattern, names):
+            found = f"no such column among {len(names)}"
+            raise InputError("--keep", f"the column {pattern!r}", found, "Correct the name.")
+
+
+def warn_of_clocks(take: Take) -> None:
+    """Warn of weights and controls to learn from that are a clock or the like.
+
+    That is by name, by shape, or because they copy time exactly, whatever their range.
+    """
+    found: dict[str, Role] = {}
+    if take.source.kind == "weights":
+        names, values = take.source.names, take.source.values
+        roles = roles_of(names, values, take.time)
+        left = (c for c, name in enumerate(names) if c not in roles and not names_face(name))
+        copies = [c for c in left if _copies(values[:, c], take.time)]
+        found |= {names[c]: role for c, role in (roles | dict.fromkeys(copies, Role.CLOCK)).items()}
+    if take.controls is not None and take.params is not None:
+        names, labels = take.controls.names, take.labels
+        roles = roles_of(names, take.params[labels], take.time[labels], sparse=True)
+        found |= {names[column]: role for column, role in roles.items()}
+    if found:
+        listed = ", ".join(f"{name!r} ({role.value})" for name, role in found.items())
+        log.warning("learned from, though by name or shape no weights: %s", listed)
+
+
+def _copies(column: FloatArray, time: FloatArray, rows: int = ENOUGH, span: float = 0.0) -> bool:
+    """Whether so many rows of a column are a ramp that copies time exactly, beyond a span."""
+    whole = len(column) >= rows and bool(np.isfinite(column).all())
+    return whole and bool(np.ptp(column) > span) and _is_line(column, time, most=1e-6)

@@ -1,0 +1,137 @@
+"""Columns that are the coordinates of markers, in the spellings of many programs.
+
+``NAME.x``, ``NAME_x``, ``NAME:X``, ``NAME X (mm)``, ``NAME.tx``, ``NAME.posX``,
+``NAME.Translate X``, ``NAME[x]``, ``nameX``, ``X_0``. Three such columns are a marker where every
+column is one of three, and their values can be positions; else they are weights.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.spelling import words
+from facert.errors import InputError
+
+log = logging.getLogger("facert")
+
+_POSITION = r"(?:t|pos|position|trans|translate|translation|loc|location|coord)"
+_UNIT = r"(?:\s*[\[(]\s*(?P<unit>mm|cm|dm|m|in|ft)\s*[\])]|_(?P<unit_>mm|cm))?"
+_SPELLINGS = tuple(
+    re.compile(pattern, flags)
+    for pattern, flags in (
+        (r"(?P<name>.+)[._](?P<axis>[xyz])", re.IGNORECASE),
+        (
+            rf"(?P<name>.+?)[._:\s/|-]\s*{_POSITION}[._:\s-]*(?P<axis>[xyz]){_UNIT}",
+            re.IGNORECASE,
+        ),
+        (rf"(?P<name>.+?)\s*[._:\s/|-]\s*(?P<axis>[xyz]){_UNIT}", re.IGNORECASE),
+        (r"(?P<name>.+?)\s*[\[(]\s*(?P<axis>[xyz])\s*[\])]", re.IGNORECASE),
+        (r"(?P<name>.*[^\W_A-Z])(?P<axis>[XYZ])", 0),
+        (r"(?P<axis>[xyz])[._:\s-]?(?P<name>\d+)", re.IGNORECASE),
+        (r"(?P<axis>[xyz])[._:\s-](?P<name>.+)", re.IGNORECASE),
+    )
+)
+_ROTATIONS = {"rot", "rotation", "rotate", "angle", "euler", "quat", "quaternion", "scale"}
+
+_ENOUGH = 10  # rows that show of what kind values are
+_IN_WEIGHTS = 1.01  # values beyond are no weights, unless they are large angles
+_OWN_MOTION = 0.08  # metres: no marker of a face moves so far among the others
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Markers among the columns of a table."""
+
+    names: tuple[str, ...]
+    columns: IntArray
+    """Columns of x, y and z of each, (M, 3)."""
+    unit: str = ""
+    """That of the positions, where their names state it."""
+
+
+def markers_among(names: Sequence[str], values: FloatArray, sure: bool = False) -> Markers | None:
+    """The markers whose coordinates the columns (T, C) are; None where they are weights.
+
+    `sure` is for columns that are known to be coordinates.
+
+    Raises `InputError` for a column that is none among others that are positions.
+    """
+    for spelling in _SPELLINGS:
+        found, unit = _triples(spelling, names)
+        if not found:
+            continue
+        markers = Markers(tuple(found), np.array(list(found.values()), dtype=np.int64), unit)
+        if markers.columns.size == len(names):
+            if not sure and not _are_positions(markers, values):
+                return None
+            if spelling is not _SPELLINGS[0] and not sure:
+                log.info("markers by columns such as %r", names[markers.columns[0, 0]])
+            return markers
+        if spelling is _SPELLINGS[0] and 2 * markers.columns.size > len(names):
+            _refuse_mixture(markers, names, values)
+    return None
+
+
+def _triples(spelling: re.Pattern[str], names: Sequence[str]) -> tuple[dict[str, list[int]], str]:
+    """Columns of x, y and z of each name that has all three in this spelling; their unit."""
+    matches = [spelling.fullmatch(name) for name in names]
+    place: dict[tuple[str, str], int] = {}
+    units = set()
+    for column, match in enumerate(matches):
+        if match is not None:
+            place.setdefault((match["name"], match["axis"].lower()), column)
+            groups = match.groupdict()
+            units.add((groups.get("unit") or groups.get("unit_") or "").lower())
+    different = dict.fromkeys(name for name, _ in place)
+    whole = [name for name in different if all((name, axis) in place for axis in "xyz")]
+    unit = units.pop() if len(units) == 1 else ""
+    return {name: [place[name, axis] for axis in "xyz"] for name in whole}, unit
+
+
+def _are_positions(markers: Markers, values: FloatArray) -> bool:
+    """Whether names and values can be those of markers; the log has it if not."""
+    if not _like_weights(markers, values):
+        return True
+    log.info(
+        "columns such as %s.x are weights by name or values; "
+        "a first column named 'time (markers)' makes them positions",
+        markers.names[0],
+    )
+    return False
+
+
+def _like_weights(markers: Markers, values: FloatArray) -> bool:
+    if any(_ROTATIONS & set(words(name)) for name in markers.names):
+        return True
+    positions = values[:, markers.columns]  # (T, M, 3)
+    observed = positions[np.isfinite(positions)]
+    if len(positions) < _ENOUGH or not len(observed) or np.abs(observed).max() > _IN_WEIGHTS:
+        return False
+    ends = np.isin(observed, (0.0, 1.0)).mean()
+    moves = np.ptp(observed) > 0
+    return bool(moves and ((observed.min() >= 0 and ends > 0.02) or _own_motion(positions)))
+
+
+def _own_motion(positions: FloatArray) -> bool:
+    """Whether the values (T, M, 3) move among themselves further than markers in metres can."""
+    with np.errstate(invalid="ignore"):
+        common = np.nan_to_num(np.nanmean(np.nan_to_num(positions), axis=1, keepdims=True))
+        spread = np.nanstd(np.where(np.isnan(positions), np.nan, positions - common), axis=0)
+    return bool(np.nanmedian(spread) > _OWN_MOTION)
+
+
+def _refuse_mixture(markers: Markers, names: Sequence[str], values: FloatArray) -> None:
+    """Refuse a column among positions that is none."""
+    if _like_weights(markers, values):
+        return
+    inside = set(markers.columns.ravel().tolist())
+    odd = next(name for column, name in enumerate(names) if column not in inside)
+    expected = "markers only, each with x, y and z"
+    fix = "Remove it: a take's source is markers or weights, not both."
+    raise InputError(f"column {odd}", expected, "another column", fix)
