@@ -27,6 +27,7 @@ from facert.models.whitening import whitening
 from facert.posing.medoids import LEAST_GAIN, MedoidProblem
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.retargeter import Retargeter
+from facert.settings import Settings
 
 # Of the whitening: markers move by what the skin does, weights have all the same range by nature.
 POWERS: dict[SourceKind, float] = {"markers": 0.75, "weights": 0.5}
@@ -121,11 +122,14 @@ def _uncertainty(model: Retargeter, take: Take) -> FloatArray:
     """Standard deviation of the model's poses, root mean square over controls, (T,); above 0."""
     std = model.retarget(take).std
     if std is None:
+        default, method = Settings().method, model.settings.method
+        go_on = "go on from the labels."
+        other = f"Train another method ({default} does), or {go_on}"
         raise InputError(
             "have",
             "a model that predicts how certain it is",
-            model.settings.method,
-            "Train another method (auto does), or go on from the labels.",
+            method,
+            go_on.capitalize() if method == default else other,
         )
     spread = np.sqrt(np.mean(std**2, axis=1))
     return np.asarray(np.maximum(spread, np.finfo(np.float64).tiny))

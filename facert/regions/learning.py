@@ -142,9 +142,17 @@ def warn_if_constant(method: Method, frames: FloatArray, labels: FloatArray) -> 
     if share < CONSTANT:
         log.warning(
             "the model predicts nearly the same pose for every frame: these vary %.1f %% as much"
-            " as the posed ones. Another method (auto), or more poses, may help",
+            " as the posed ones. %s may help",
             100 * share,
+            _remedy(method.settings),
         )
+
+
+def _remedy(settings: Settings) -> str:
+    """What may help a method that learned next to nothing."""
+    if settings.method == Settings().method:
+        return "More poses, or others (facert suggest names frames to pose),"
+    return f"Another method ({Settings().method}), or more poses,"
 
 
 def _spread(poses: FloatArray) -> float:

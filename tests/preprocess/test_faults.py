@@ -3,7 +3,13 @@ import pytest
 
 from facert.data.take import Source
 from facert.io.formats import read_take_file
-from facert.preprocess.faults import exchanged, find_faults, held_values, single_spikes
+from facert.preprocess.faults import (
+    exchanged,
+    find_faults,
+    held_values,
+    single_spikes,
+    without_faults,
+)
 
 
 def source(markers):
@@ -139,3 +145,63 @@ REAL = {
 def test_false_alarms_on_real_takes_are_below_one_in_a_thousand(real_data, name, target):
     real = read_take_file(real_data / f"{name}.npz", target=target).source
     assert find_faults(real).any.mean() < 1e-3
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01, 10.0])
+@pytest.mark.parametrize("size", [5.0, 12.0, 40.0])
+def test_a_marker_elsewhere_for_seconds_has_strayed(face, head, size, scale):
+    markers = head.apply(face)
+    way = size * np.array([0.6, 0.0, 0.8])
+    places = [(slice(100, 190), 10), (slice(0, 60), 14), (slice(340, 400), 3), (slice(180, 260), 7)]
+    for frames, marker in places:
+        markers[frames, marker] += way
+    found = find_faults(source(scale * markers))
+    np.testing.assert_array_equal(found.any, at(face.shape, *places))
+    np.testing.assert_array_equal(found.strayed, found.any)
+
+
+def test_a_reflection_that_stands_still_has_strayed(face, head):
+    markers = head.apply(face)
+    rng = np.random.default_rng(0)
+    markers[150:220, 11] = markers[150, 11] + [0.0, 20.0, 10.0] + 0.01 * rng.normal(size=(70, 3))
+    expected = at(face.shape, (slice(150, 220), 11))
+    np.testing.assert_array_equal(find_faults(source(markers)).any, expected)
+
+
+def test_a_stray_that_comes_and_goes_slowly_is_found_while_it_is_far(face):
+    markers = face.copy()
+    ramp = np.minimum(1.0, np.minimum(np.arange(90), np.arange(90)[::-1]) / 10.0)
+    markers[100:190, 10] += 15.0 * ramp[:, None] * [1.0, 0.0, 0.0]
+    found = find_faults(source(markers)).any
+    assert found[103:187, 10].all()
+    found[100:190, 10] = False
+    assert not found.any()
+
+
+def test_a_marker_that_strays_in_a_third_of_the_take_is_hidden_there_and_nowhere_else(face, head):
+    markers = head.apply(face)
+    places = [(slice(start, start + 35), 10) for start in range(20, 400, 100)]
+    for frames, marker in places:
+        markers[frames, marker] += [9.0, -3.0, 4.0]
+    np.testing.assert_array_equal(find_faults(source(markers)).any, at(face.shape, *places))
+
+
+def test_expressions_that_come_once_have_not_strayed(face, head):
+    jaw = face.copy()
+    opening = np.sin(np.linspace(0.0, np.pi, 40))[:, None] ** 2
+    for marker, far in ((15, 4.0), (16, 3.0), (17, 3.5), (18, 2.0)):
+        jaw[200:240, marker] += far * opening * [0.1, -1.0, -0.2]
+    for markers in (jaw, head.apply(jaw)):
+        assert not find_faults(source(markers)).any.any()
+    raised = face.copy()
+    raised[200:240, 15] += 2.5 * opening * [0.0, 1.0, 0.0]  # by a marker alone
+    assert not find_faults(source(raised)).any.any()
+
+
+def test_strays_are_named_with_their_frames(face, as_take, caplog):
+    markers = face.copy()
+    markers[120:210, 10] += [9.0, 0.0, 0.0]
+    hidden = without_faults(as_take(markers)).source
+    np.testing.assert_array_equal(~hidden.valid, at(face.shape, (slice(120, 210), 10)))
+    line = "m10 in 90 frames from 120 is far from where the other markers put it"
+    assert f"{line}: taken as not observed" in caplog.text

@@ -35,6 +35,16 @@ def test_a_model_of_labels_that_frames_do_not_explain_is_constant(caplog) -> Non
     assert predicted.std() < CONSTANT * Y.std()
     warn_if_constant(method, X, Y)
     assert "nearly the same pose for every frame" in caplog.text
+    assert "Another method (auto), or more poses, may help" in caplog.text
+
+
+def test_users_of_auto_are_not_advised_to_try_auto(caplog) -> None:
+    method = make_method(Settings(method="auto"))
+    X = np.random.default_rng(1).normal(size=(20, 4))
+    method.fit(Labelled(X, 1.0 + 0.0 * X), Unlabelled(X, X[:0]))
+    warn_if_constant(method, X, X)
+    assert "nearly the same pose" in caplog.text
+    assert "auto" not in caplog.text
 
 
 def test_it_looks_at_a_part_of_many_frames(caplog) -> None:
