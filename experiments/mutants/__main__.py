@@ -10,6 +10,7 @@ in its list, is killed in spite of one, or no longer fits the code. Recordings a
 
 from __future__ import annotations
 
+import gc
 import importlib
 import multiprocessing
 import os
@@ -36,8 +37,11 @@ HEAVY = (
     "sklearn.gaussian_process",
     "robust_laplacian",
     "h5py",
+    "hypothesis.strategies",
 )
 """Imported once, for every run to find them there; the package itself is imported by each."""
+OPTIONS = ("-x", "-p", "no:cacheprovider", "-p", "no:xdist")
+QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what was imported before
 LONGEST = 300.0  # seconds; a change may make a loop endless
 OUTPUT = "output.txt"
 FOUND_NOTHING = {2: "interrupted", 3: "internal error", 4: "usage error", 5: "no tests"}
@@ -49,6 +53,7 @@ def main() -> None:
     began = time.perf_counter()
     for name in HEAVY:
         importlib.import_module(name)
+    gc.freeze()  # or each run would look through all of it for what can be freed
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
         outcome = copy.run(sorted({test for change in chosen for test in change.tests}))
@@ -125,9 +130,8 @@ class Copy:
         sys.path.insert(0, str(self.folder))
         # In a place without recordings, and with the same examples every time.
         os.environ |= {"PYTHONPATH": str(self.folder), "FACERT_DATA": "/nowhere", "CI": "1"}
-        options = ["-x", "-p", "no:cacheprovider", "-p", "no:xdist"]
         with Path(OUTPUT).open("w", encoding="utf-8") as out, redirect_stdout(out):
-            status = pytest.main([*options, *[f"tests/{test}" for test in tests]])
+            status = pytest.main([*OPTIONS, *QUIET, *[f"tests/{test}" for test in tests]])
         os._exit(int(status))
 
 

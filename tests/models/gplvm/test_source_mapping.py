@@ -183,6 +183,17 @@ def test_a_better_start_is_taken_and_a_worse_one_is_not(mapping):
     np.testing.assert_allclose(again.energy, plain.energy, atol=1e-7)
 
 
+def test_newtons_method_begins_at_the_start_of_least_energy(mapping):
+    observed = Observation.of(make_frames(mapping, 10, missing=0.3), SIGMA_C)
+    solved, latents = mapping.solve(observed).z, mapping.start(observed)
+    lower = mapping.energy(solved, observed) < mapping.energy(latents, observed)
+    assert lower.all()
+    for starts in ([solved], [np.full((10, 2), 5.0), solved]):
+        np.testing.assert_array_equal(mapping._best_start(observed, starts), solved)
+    np.testing.assert_array_equal(mapping._best_start(observed, []), latents)
+    np.testing.assert_array_equal(mapping._best_start(observed, [np.full((10, 2), 5.0)]), latents)
+
+
 def test_the_pull_of_the_previous_frame_goes_from_nothing_to_everything(mapping):
     frames, previous = make_frames(mapping, 5), make_frames(mapping, 5, seed=7)
     observed = Observation.of(frames, SIGMA_C)
