@@ -80,7 +80,7 @@ def weights_difference(take: Take, time: FloatArray, weights: FloatArray) -> flo
 
 
 def markers_difference(take: Take, positions: FloatArray, fps: float) -> float:
-    """The largest difference of a marker's coordinate, where both have one, and of the rate.
+    """The largest difference of a marker's coordinate, where both have one, or the rate's share.
 
     Raises `ValueError` for other markers, or other ones hidden.
     """
@@ -89,4 +89,4 @@ def markers_difference(take: Take, positions: FloatArray, fps: float) -> float:
     values = take.source.values
     if values.shape != positions.shape or (np.isnan(values) != np.isnan(positions)).any():
         raise ValueError(f"{np.isnan(values).sum()} of {values.size} numbers are hidden")
-    return float(max(np.nanmax(np.abs(values - positions)), abs(take.fps - fps)))
+    return float(max(np.nanmax(np.abs(values - positions)), abs(take.fps / fps - 1)))

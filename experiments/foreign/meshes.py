@@ -71,7 +71,7 @@ def _scene(folder: Path) -> float:
     scene.graph.update(frame_to="armature", frame_from="world", matrix=head)
     scene.add_geometry(_mesh(100 * VERTICES), "head", "face", "armature", transform=node)
     scene.export(str(folder / "head.glb"))
-    expected = scene.dump(concatenate=True).vertices
+    expected = scene.to_mesh().vertices
     return _apart(read_mesh(folder / "head.glb").vertices, np.asarray(expected))
 
 
@@ -96,7 +96,7 @@ def _glb_back(folder: Path) -> float:
 
     write_glb(rig_morphs(FACE, WEIGHTS, TIME, FPS), folder / "face.glb")
     scene = trimesh.load_scene(str(folder / "face.glb"), process=False)
-    return _apart(np.asarray(scene.dump(concatenate=True).vertices), VERTICES)
+    return _apart(np.asarray(scene.to_mesh().vertices), VERTICES)
 
 
 def _usd_at(rate: float) -> Any:
