@@ -221,6 +221,13 @@ def _lost(names: Sequence[str], among: Sequence[str], field: str) -> InputError:
     )
 
 
+def are_same(names: Sequence[str], others: Sequence[str]) -> bool:
+    """Whether two lists hold the same names, in any order and spelling."""
+    index = NameIndex.among(others, names, "names", quiet=True)
+    places = {index.find(name) for name in names}
+    return None not in places and len(places) == len(names) == len(others)
+
+
 def fitting(pattern: str, names: Sequence[str]) -> list[int]:
     """Indices of the names that match a name in any spelling, or with wildcards.
 

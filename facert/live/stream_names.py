@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,7 +28,7 @@ class StreamNames:
     """Rows of a stream's names, and the row of each wanted name.
 
     Names are wanted in any spelling; a prefix or a suffix that all have is seen through as soon as
-    there are names enough to be sure. The first of two names that mean the same counts.
+    there are names enough to be sure. Of two names that mean the same the first counts.
 
     Parameters
     ----------
@@ -37,50 +38,46 @@ class StreamNames:
     def __init__(self, wanted: Sequence[str]) -> None:
         self._wanted = tuple(wanted)
         self._index = NameIndex(self._wanted)
-        self._rows: dict[str, int] = {}
-        self._paths: dict[str, str] = {}
+        self._rows: dict[tuple[str, str], int] = {}
         self._aligned: Alignment | None = None
         self._settled = self._tries = 0
-        self._two = False
+        self._warned = self._two = False
         self.rows: IntArray = np.full(len(self._wanted), -1, dtype=np.int64)
         """(D,): The row of each wanted name; -1 where the stream has not brought it."""
-
-    @property
-    def unknown(self) -> list[str]:
-        """The stream's names that are not wanted."""
-        used = set(self.rows.tolist())
-        return [name for name, row in self._rows.items() if row not in used]
-
-    @property
-    def absent(self) -> list[str]:
-        """The wanted names that the stream has not brought."""
-        return [name for name, row in zip(self._wanted, self.rows, strict=True) if row < 0]
 
     @property
     def count(self) -> int:
         """The number of the stream's names."""
         return len(self._rows)
 
-    def row(self, name: str, path: str = "") -> int | None:
-        """The row of a name that the stream brings, from 0; None where there are too many.
+    @property
+    def unknown(self) -> list[str]:
+        """The stream's names that are not wanted."""
+        used = set(self.rows.tolist())
+        return [label for row, label in enumerate(self._labels()) if row not in used]
 
-        Under a second path, the same name is another one.
-        """
-        if len(self._paths) < MOST and self._paths.setdefault(name, path) != path:
-            self._warn_of_two(f"{self._paths[name]}/{name}", f"{path}/{name}")
-            name = f"{path}/{name}"
-        found = self._rows.get(name)
+    @property
+    def absent(self) -> list[str]:
+        """The wanted names that the stream has not brought."""
+        return [name for name, row in zip(self._wanted, self.rows, strict=True) if row < 0]
+
+    def row(self, name: str, path: str = "") -> int | None:
+        """The row of a name that comes under a path, from 0; None where there are too many."""
+        found = self._rows.get((path, name))
         if found is None and len(self._rows) < MOST:
-            found = self._rows[name] = len(self._rows)
+            found = self._rows[path, name] = len(self._rows)
         return found
 
     def settle(self) -> None:
         """Find the wanted names among those that came since."""
         if len(self._rows) == self._settled:
             return
-        new = list(self._rows)[self._settled :]
-        if not self._place(new) and self._is_time():
-            self._align()
+        labels = self._labels()
+        known = self._place(labels)
+        if not known and self._is_time() and self._align(labels):
+            self._place(labels)
+        if not self._two:
+            self._place([name for _, name in self._rows])
         self._settled = len(self._rows)
 
     def report(self) -> None:
@@ -92,45 +89,45 @@ class StreamNames:
             count = plural(len(absent), "name")
             log.info("%s not sent yet, not observed until then: %s", count, listed(absent))
 
-    def _place(self, names: Sequence[str]) -> bool:
-        """Place names as they are to be read now; return whether all of them are wanted."""
-        known = True
-        for name in names:
-            place = self._index.find(name)
-            known = known and place is not None
+    def _labels(self) -> list[str]:
+        """The names; with its path, where a name comes under several."""
+        count = Counter(name for _, name in self._rows)
+        return [name if count[name] == 1 else f"{path}/{name}" for path, name in self._rows]
+
+    def _place(self, labels: Sequence[str]) -> bool:
+        """Give each wanted name that has none the row of its label; return if all are wanted."""
+        places = [self._index.find(label) for label in labels]
+        for row, place in enumerate(places):
             if place is None:
                 continue
-            if self.rows[place] < 0:
-                self.rows[place] = self._rows[name]
-            elif self.rows[place] != self._rows[name]:
-                self._warn_of_two(list(self._rows)[self.rows[place]], name)
-        return known
-
-    def _warn_of_two(self, first: str, second: str) -> None:
-        if not self._two:
-            log.warning("%r and %r come for one name: the first counts", first, second)
-        self._two = True
+            first = self.rows[place]
+            if first < 0:
+                self.rows[place] = row
+            elif first != row and not self._warned:
+                both = [f"{path}/{name}" for path, name in self._rows]
+                log.warning("%s and %s are one name: the first counts", both[first], both[row])
+                self._warned = True
+        return None not in places
 
     def _is_time(self) -> bool:
         few = len(self._rows) <= MOST_ALIGNED
         return few and (self._tries < _TRIES or 2 * len(self._rows) >= 3 * self._settled)
 
-    def _align(self) -> None:
+    def _align(self, labels: Sequence[str]) -> bool:
         """Look for a prefix or suffix without which the names are those that are wanted."""
         self._tries += 1
         try:
-            index = NameIndex.among(self._wanted, list(self._rows), "stream", quiet=True)
-        except InputError as error:  # one subject that is known already stays
+            index = NameIndex.among(self._wanted, labels, "stream", quiet=True)
+        except InputError as error:
             if not self._two:
                 log.warning("names of the stream are %s: send those of one", error.found)
             self._two = True
-            return
+            return False
         if index.aligned is None or _same(index.aligned, self._aligned):
-            return
+            return False
         self._index, self._aligned = index, index.aligned
-        log.info("%s", self._aligned.text(list(self._rows), self._wanted))
-        self.rows[:] = -1
-        self._place(list(self._rows))
+        log.info("%s", self._aligned.text(labels, self._wanted))
+        return True
 
 
 def _same(one: Alignment, other: Alignment | None) -> bool:

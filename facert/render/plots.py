@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from facert.data.names import NameIndex
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.render.faces import INK, require_poses
@@ -98,11 +99,13 @@ def _column(take: Take, name: str) -> int:
     """Index of a control."""
     require_poses(take)
     assert take.controls is not None  # poses come with controls
-    if name not in take.controls.names:
+    names = take.controls.names
+    place = NameIndex.among(names, [name], "/target/names", quiet=True).find(name)
+    if place is None:
         raise InputError(
             "/target/names",
             "the controls that are to be drawn",
             f"no {name!r}",
-            f"It has: {', '.join(take.controls.names)}.",
+            f"It has: {', '.join(names)}.",
         )
-    return take.controls.names.index(name)
+    return place

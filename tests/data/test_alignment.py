@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from facert.data.labelling import Poses, labelled, weights_as_poses
-from facert.data.names import ARKIT_SHAPES, fitting, instead_of, match, nearest, shape_drivers
+from facert.data.names import (
+    ARKIT_SHAPES,
+    are_same,
+    fitting,
+    instead_of,
+    match,
+    nearest,
+    shape_drivers,
+)
 from facert.data.regions import Regions
 from facert.data.rig import Rig
 from facert.data.shared_controls import shared_controls
@@ -202,3 +210,10 @@ def test_regions_name_markers_and_controls_without_a_prefix():
     }
     found = Regions.of(tables).matched(["A:LBRO", "A:CHIN"], ["BS_jawOpen", "BS_browInnerUp"])
     assert found.tables["brows"] == {"markers": ["A:LBRO"], "controls": ["BS_browInnerUp"]}
+
+
+def test_lists_are_the_same_in_any_order_spelling_and_prefix():
+    assert are_same(spelled(FEW[::-1], "Face:"), ARKIT_SHAPES) is False
+    assert are_same(spelled(FEW[::-1], "Face:"), FEW)
+    assert not are_same(FEW, FEW[1:])
+    assert not are_same(("jawOpen", "JawOpen"), ("jawOpen", "mouthOpen"))

@@ -138,6 +138,7 @@ def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
     """The frame of ``TAKE:FRAME``: as TAKE has it where that is a result, else retargeted."""
     from dataclasses import replace
 
+    from facert.data.names import are_same
     from facert.io.formats import read_source_file
 
     path, _, number = start.rpartition(":")
@@ -148,8 +149,8 @@ def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
         expected = f"a frame from 0 to {len(take) - 1}"
         raise InputError("--from", expected, number, "Choose another.", where=path)
     one = _frame(take, frame)
-    known = None if take.controls is None else set(take.controls.names)
-    if one.std is not None and known == set(retargeter.controls.names):
+    known = () if take.controls is None else take.controls.names
+    if one.std is not None and are_same(known, retargeter.controls.names):
         return one
     with reading(path):
         return retargeter.retarget(replace(one, params=None, std=None))

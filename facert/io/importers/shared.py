@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import unicodedata
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -46,8 +47,8 @@ def keys(curves: Curves, name: str) -> list[Key]:
 
 def spelling(name: str) -> str:
     """Common spelling of ``eyeBlink_L``, ``EyeBlinkLeft`` and ``eye-blink.left``."""
-    name = re.sub(r"(?<=[a-z0-9])[LR]$|[._-][lLrR]$", _side, name)
-    return re.sub(r"[^a-z0-9]", "", name.lower())
+    name = re.sub(r"(?<=[a-z0-9])[LR]$|[._-][lLrR]$", _side, unicodedata.normalize("NFKC", name))
+    return re.sub(r"[\W_]", "", name.casefold())
 
 
 def find(name: str, there: Iterable[str]) -> str | None:
