@@ -26,6 +26,7 @@ from facert.io.registry import (
     unknown_input,
     write,
 )
+from facert.mesh.registration import registered
 
 log = logging.getLogger("facert")
 
@@ -40,6 +41,7 @@ def read_any(
     kind: TakeOrRig | None = None,
     or_fps: float | None = None,
     keep: Sequence[str] = (),
+    align: bool = False,
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -57,6 +59,8 @@ def read_any(
         Frames a second of a file that does not state it, where there is no `fps`.
     keep : sequence of str
         Columns of a table that are weights, though they look like a clock, a counter or a flag.
+    align : bool
+        Move shapes of a rig into register with its neutral; else they are logged.
 
     Raises
     ------
@@ -83,6 +87,8 @@ def read_any(
     if isinstance(read, Take) and found.mixed and function(found.mixed)(path):
         with reading(path):
             read = learnable(read, keep)
+    if isinstance(read, Rig):
+        read = registered(read, align)
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
 

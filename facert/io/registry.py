@@ -142,7 +142,8 @@ FORMATS = (
     Format(
         (FOLDER,),
         {"rig": "obj.read_obj_folder"},
-        reads="`neutral.obj` and one OBJ a shape: a rig",
+        reads="`neutral.obj` and one OBJ a shape: a rig; shapes beside the neutral, in another "
+        "unit or with another axis up are named, and moved by `--align-shapes`",
     ),
 )
 

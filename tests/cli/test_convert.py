@@ -54,6 +54,33 @@ def test_meshes_become_a_rig(facert, tmp_path):
     assert read_rig_file(tmp_path / "rig.h5").names == ("smile",)
 
 
+def test_shapes_that_stand_beside_the_neutral_are_named_and_moved_back(facert, tmp_path):
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    places = {"neutral": (0, 0), "jawOpen": (0, -0.5), "smile": (20, 0), "pucker": (20, -0.2)}
+    for name, (right, low) in places.items():
+        corners = [(0, low), (2, low), (0, 1), (2, 1), (1, 2)]
+        lines = [f"v {x + right} {y} 0" for x, y in corners]
+        (folder / f"{name}.obj").write_text("\n".join([*lines, "f 1 2 4 3", "f 3 4 5"]))
+    done = facert("convert", folder, tmp_path / "rig.h5")
+    warning = " ".join(done.err.split())
+    assert "pucker, smile move every vertex by 10 times the face's width" in warning
+    assert "--align-shapes" in warning
+    assert "jawOpen" not in warning
+    done = facert("convert", folder, tmp_path / "mended.h5", "--align-shapes")
+    assert "moved into register with the neutral: pucker, smile" in " ".join(done.err.split())
+    rig = read_rig_file(tmp_path / "mended.h5")
+    shapes = dict(zip(rig.names, rig.shapes, strict=True))
+    np.testing.assert_allclose(shapes["smile"], 0, atol=1e-9)
+    np.testing.assert_allclose(shapes["pucker"], [[0, -0.2, 0]] * 2 + [[0, 0, 0]] * 3, atol=1e-6)
+
+
+def test_a_take_has_no_shapes_to_align(facert, recording, tmp_path):
+    refused = facert("convert", recording, tmp_path / "take.h5", "--align-shapes")
+    assert refused.code == 3
+    assert "--align-shapes: expected a rig, found a take" in " ".join(refused.err.split())
+
+
 def test_an_existing_output_needs_overwrite(facert, recording, tmp_path):
     output = tmp_path / "take.h5"
     output.write_text("precious")

@@ -68,6 +68,10 @@ def command(
     start_timecode: Annotated[
         str, option("Of the first frame, HH:MM:SS:FF; drop-frame HH:MM:SS;FF.")
     ] = "",
+    align_shapes: Annotated[
+        bool,
+        option("Move, turn and scale shapes that are not in register with the neutral of a rig."),
+    ] = False,
     rig_path: RIG = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
@@ -103,6 +107,8 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()))
+    wanted = Wanted(
+        kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()), align_shapes
+    )
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

@@ -36,6 +36,7 @@ class Wanted:
     or_fps: float | None = None
     rig: Path | None = None
     keep: tuple[str, ...] = ()
+    align: bool = False
 
 
 def convert_file(
@@ -63,6 +64,8 @@ def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overw
         found = converted(found, changes)
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
+        if wanted.align:
+            raise InputError("--align-shapes", "a rig", "a take", "Leave it out.")
         if of_morphs:
             return _write_motion(_motion(found, wanted, changes), output, overwrite)
     formats.write_take_file(found, output, overwrite)
@@ -87,7 +90,8 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
     no_rig = not require_output(output, True, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or wanted.fps or changes.of_frames or no_rig):
         kind = "take"
-    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps, wanted.keep)
+    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
+    return formats.read_any(source, *options, wanted.keep, wanted.align)
     return formats.read_any(source, *options)
 
 
