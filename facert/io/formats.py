@@ -26,7 +26,6 @@ from facert.io.registry import (
     unknown_input,
     write,
 )
-from facert.mesh.registration import registered
 
 log = logging.getLogger("facert")
 
@@ -88,6 +87,8 @@ def read_any(
         with reading(path):
             read = learnable(read, keep)
     if isinstance(read, Rig):
+        from facert.mesh.registration import registered  # its libraries are slow to load
+
         read = registered(read, align)
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
