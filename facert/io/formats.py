@@ -59,7 +59,7 @@ def read_any(
     keep : sequence of str
         Columns of a table that are weights, though they look like a clock, a counter or a flag.
     align : bool
-        Move shapes of a rig into register with its neutral; else they are logged.
+        Move shapes into register with the neutral where they are meshes; else they are logged.
 
     Raises
     ------
@@ -81,15 +81,15 @@ def read_any(
         raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
     fps = None if fps is None else standard_rate(fps)
     options = {"target": target, "shapes": shapes, "fps": fps or or_fps, "keep": keep}
+    options |= {"align": align}
     taken = signature(reader).parameters.keys() & options.keys()
+    if align and "align" not in taken:
+        fix = "Leave it out: the shapes are displacements."
+        raise InputError("--align-shapes", "a folder of OBJ files", held, fix, where=str(path))
     read: Take | Rig = reader(path, **{name: options[name] for name in taken})
     if isinstance(read, Take) and found.mixed and function(found.mixed)(path):
         with reading(path):
             read = learnable(read, keep)
-    if isinstance(read, Rig):
-        from facert.mesh.registration import registered  # its libraries are slow to load
-
-        read = registered(read, align)
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
 

@@ -16,6 +16,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh, Rig
 from facert.errors import InputError, reading
 from facert.io.guarded import read_text
+from facert.mesh.registration import registered
 
 log = logging.getLogger("facert")
 
@@ -23,8 +24,11 @@ NEUTRAL = "neutral"
 MAX_VERTICES = 2**31
 
 
-def read_obj_folder(folder: Path) -> Rig:
+def read_obj_folder(folder: Path, align: bool = False) -> Rig:
     """Read ``neutral.obj`` and the other OBJ files of a folder, named and sorted by file name.
+
+    Shapes that are not in register with the neutral are logged, or moved with `align`; see
+    `facert.mesh.registration.registered`.
 
     Raises `InputError` naming the file and the line that is at fault, or two meshes that do not
     belong together.
@@ -41,7 +45,8 @@ def read_obj_folder(folder: Path) -> Rig:
     shapes = [_read_shape(path, neutral, faces) - neutral for path in shape_files]
     with reading(folder):
         names = tuple(path.stem for path in shape_files)
-        return Rig(neutral=neutral, shapes=np.stack(shapes), names=names, faces=faces)
+        rig = Rig(neutral=neutral, shapes=np.stack(shapes), names=names, faces=faces)
+        return registered(rig, align)
 
 
 def read_obj(path: Path) -> Mesh:

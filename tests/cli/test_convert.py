@@ -78,7 +78,8 @@ def test_shapes_that_stand_beside_the_neutral_are_named_and_moved_back(facert, t
 def test_a_take_has_no_shapes_to_align(facert, recording, tmp_path):
     refused = facert("convert", recording, tmp_path / "take.h5", "--align-shapes")
     assert refused.code == 3
-    assert "--align-shapes: expected a rig, found a take" in " ".join(refused.err.split())
+    expected = "--align-shapes: expected a folder of OBJ files, found take"
+    assert expected in " ".join(refused.err.split())
 
 
 def test_an_existing_output_needs_overwrite(facert, recording, tmp_path):

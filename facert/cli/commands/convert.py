@@ -70,7 +70,7 @@ def command(
     ] = "",
     align_shapes: Annotated[
         bool,
-        option("Move, turn and scale shapes that are not in register with the neutral of a rig."),
+        option("Move, turn and scale .obj that are not in register with neutral.obj."),
     ] = False,
     rig_path: RIG = None,
     out_dir: OUT_DIR = None,
@@ -107,8 +107,6 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(
-        kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()), align_shapes
-    )
+    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()), align_shapes)
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

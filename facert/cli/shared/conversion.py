@@ -64,8 +64,6 @@ def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overw
         found = converted(found, changes)
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
-        if wanted.align:
-            raise InputError("--align-shapes", "a rig", "a take", "Leave it out.")
         if of_morphs:
             return _write_motion(_motion(found, wanted, changes), output, overwrite)
     formats.write_take_file(found, output, overwrite)
@@ -92,7 +90,6 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
         kind = "take"
     options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
     return formats.read_any(source, *options, wanted.keep, wanted.align)
-    return formats.read_any(source, *options)
 
 
 def _convert_sequence(source: Path, output: Path, plain: bool, overwrite: bool) -> str:
