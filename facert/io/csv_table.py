@@ -98,7 +98,8 @@ def _is_marked(text: str) -> bool:
 
 def _read_marked(text: str) -> Take:
     """A table whose first cell states what the others are."""
-    header, rows = parse_csv(text, stripped=False)
+    after = text.index(")") + 1
+    header, rows = parse_csv(text, text[after:].lstrip('"')[:1] or ",")
     check_width(rows, header)
     numbers = to_numbers(rows, header, range(len(header)))
     time, values, names = numbers[:, 0], numbers[:, 1:], header[1:]

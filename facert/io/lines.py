@@ -68,8 +68,10 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
     return parse_csv(read_text(path))
 
 
-def parse_csv(text: str, stripped: bool = True) -> tuple[tuple[str, ...], list[Line]]:
-    """Parse a CSV text with a header, by default without blanks around its names.
+def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Line]]:
+    """Parse a CSV text with a header; a separator that is given is followed to the letter.
+
+    Else it is the one that the header shows, and blanks around names do not count.
 
     Blank lines are skipped. Where the header is separated by semicolons or tabs, as Excel does in
     much of Europe, so are the rows, and their numbers may have decimal commas.
@@ -85,7 +87,8 @@ def parse_csv(text: str, stripped: bool = True) -> tuple[tuple[str, ...], list[L
         When there is no header, or no row.
     """
     lines = text.splitlines()
-    separator = separator_of(next(filter(str.strip, lines), ""))
+    stripped = not separator
+    separator = separator or separator_of(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
         rows = [Line(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
