@@ -71,8 +71,8 @@ _ROLES = _by_word(
 )
 _NUMBERS = _set("index idx id ids uid number num no nr count counter seq sequence")
 _BESIDE = _set(
-    "face faces blend shape shapes blendshape blendshapes landmark landmarks is has device system "
-    "capture captured video camera cam image img host local gmt posix world mono monotonic "
+    "head face faces blend shape shapes blendshape blendshapes landmark landmarks is has device "
+    "system capture captured video camera cam image img host local gmt posix world mono monotonic "
     "sensor recv received receive send sent server client arrival relative rel absolute abs since "
     "start code of in the per arkit mediapipe raw data app hw cpu gpu user person subject actor "
     "tracker total process processing inference wall media hardware software recording "

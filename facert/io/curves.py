@@ -38,21 +38,30 @@ def read_curves(path: Path, fps: float | None = None) -> Take:
     Raises `InputError` naming the file and the key that is at fault.
     """
     with reading(path):
-        document = read_json_object(path)
-        names = _names(document)
-        values = _matrix(_first(document, _VALUES, "weights, a row a frame"), len(names))
-        _check_count(document, "numPoses", len(names))
-        _check_count(document, "numFrames", len(values))
-        rate = _rate(document, fps)
-        time = np.arange(len(values)) / rate
-        if "time" in document:
-            time = _numbers(document["time"], "time")
-        return Take(
-            time=time,
-            source=Source(values, names),
-            fps=rate,
-            start_timecode=_text(document, "startTimecode"),
-        )
+        return take_of_curves(read_json_object(path), fps)
+
+
+def holds_curves(document: Mapping[str, Any]) -> bool:
+    """Whether an object has a matrix of weights, as curves have."""
+    return any(not isinstance(document.get(key, {}), dict) for key in _VALUES)
+
+
+def take_of_curves(document: Mapping[str, Any], fps: float | None = None) -> Take:
+    """The take that an object of curves is; see `read_curves`."""
+    names = _names(document)
+    values = _matrix(_first(document, _VALUES, "weights, a row a frame"), len(names))
+    _check_count(document, "numPoses", len(names))
+    _check_count(document, "numFrames", len(values))
+    rate = _rate(document, fps)
+    time = np.arange(len(values)) / rate
+    if "time" in document:
+        time = _numbers(document["time"], "time")
+    return Take(
+        time=time,
+        source=Source(values, names),
+        fps=rate,
+        start_timecode=_text(document, "startTimecode"),
+    )
 
 
 def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:

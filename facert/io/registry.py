@@ -85,11 +85,13 @@ FORMATS = (
     ),
     Format(
         (".json",),
-        read={"take": "curves.read_curves"},
+        read={"take": "tracker_json.read_json_take"},
         write={"take": "curves.write_curves"},
+        mixed="tracker_json.is_mixed",
         missing="held",
-        about=" of Audio2Face",
-        reads="Audio2Face curves",
+        about=" of Audio2Face or a tracker",
+        reads="Audio2Face curves; frames of MediaPipe, BEAT and others: a list of objects, one a "
+        "line, or columns",
         writes="poses (else source weights)",
     ),
     Format((".txt",), {"take": "facecap.read_facecap"}, about=" of Face Cap", reads="Face Cap"),

@@ -27,6 +27,7 @@ log = logging.getLogger("facert")
 
 _UNIT = re.compile(r"AU\d\d_r")
 _FEWEST_UNITS = 3
+_FEWEST_SHAPES = 10
 _LISTED = 6
 
 
@@ -128,7 +129,7 @@ def _columns(table: Table, clock: int | None, keep: Sequence[str]) -> IntArray:
         if name or not blank[column]
     ]
     _log_texts(table, texts, numbers)
-    others = [column for column in numbers if column not in kept]
+    others = _of_mediapipe(table.names, [c for c in numbers if c not in kept])
     kept_numbers = [column for column in numbers if column in kept]
     return np.array(sorted(_of_openface(table.names, others) + kept_numbers), dtype=np.int64)
 
@@ -140,7 +141,17 @@ def _log_texts(table: Table, texts: Sequence[int], numbers: Sequence[int]) -> No
         row = next(row for row, cell in enumerate(cells) if cell)
         raise table.error(row, texts[0], "a number", repr(cells[row][:40]))
     if texts:
-        log.info("left out, as text: %s", _listed([table.names[column] for column in texts]))
+        log.info("left out, as text: %s", listed([table.names[column] for column in texts]))
+
+
+def _of_mediapipe(names: Sequence[str], columns: Sequence[int]) -> list[int]:
+    """The columns without MediaPipe's ``_neutral``, which is no shape."""
+    neutral = [column for column in columns if names[column] == "_neutral"]
+    shapes = sum(canonical(names[column]) in ARKIT_NAMES for column in columns)
+    if not neutral or shapes < _FEWEST_SHAPES:
+        return list(columns)
+    log.info("left out, as no shape: '_neutral' of MediaPipe; --keep _neutral keeps it")
+    return [column for column in columns if column not in neutral]
 
 
 def _of_openface(names: Sequence[str], columns: Sequence[int]) -> list[int]:
@@ -155,7 +166,7 @@ def _of_openface(names: Sequence[str], columns: Sequence[int]) -> list[int]:
         log.info(
             text + "of X_0, Y_0, Z_0 ... alone is one of markers",
             plural(len(units), "action unit"),
-            _listed(rest),
+            listed(rest),
         )
     return units + flags
 
@@ -198,6 +209,7 @@ def arkit_names(names: Sequence[str]) -> tuple[str, ...]:
     return own
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """The first of some names, for the log."""
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return ", ".join(map(repr, names[:_LISTED])) + more

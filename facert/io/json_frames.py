@@ -1,0 +1,244 @@
+"""The frames of a tracker's JSON, found by their shape: named numbers and texts of each.
+
+Frames are a list of objects, wherever it stands, one object a line, an object with a key a frame,
+or columns. In each, weights are ``{name: number}``, a list of objects with a name and a score, or a
+list of numbers, one a name of a list beside the frames.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from facert.data.column_names import role_of_name
+from facert.errors import InputError
+
+Number = int | float
+"""Truths are numbers as well."""
+
+_NAME_KEYS = ("categoryName", "category_name", "name", "label", "key", "shape", "blendShape",
+              "blendshape", "displayName", "display_name")  # fmt: skip
+_SCORE_KEYS = ("score", "value", "weight", "coefficient", "amount")
+_DEEPEST = 6
+
+
+@dataclass
+class Frame:
+    """The contents of a frame."""
+
+    plain: dict[str, Number | str] = field(default_factory=dict)
+    """Numbers and texts of the frame's own."""
+    groups: dict[str, dict[str, Number]] = field(default_factory=dict)
+    """Named numbers under each key."""
+    others: set[str] = field(default_factory=set)
+    """Keys of numbers without names."""
+
+
+def parsed(text: str) -> Any:
+    """What a JSON text holds; of a text with an object a line, the list of them.
+
+    Raises `InputError` for any other text.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        lines = [line for line in text.splitlines() if line.strip()]
+        if len(lines) < 2 or not all(line.lstrip()[0] in "{[" for line in lines):
+            raise InputError("file", "JSON", str(error), "Export it again.") from None
+    try:
+        return [json.loads(line) for line in lines]
+    except (ValueError, RecursionError) as error:
+        expected = "JSON, whole or in each line"
+        raise InputError("lines", expected, str(error), "Export it again.") from None
+
+
+def frames_of(document: Any) -> list[Frame]:
+    """The frames of a document.
+
+    Raises `InputError` when there are none, or a frame has more or fewer numbers than names.
+    """
+    names = _names(document)
+    found = _by_key(document) if isinstance(document, dict) else None
+    lists = [found] if found else list(_lists(document, names))
+    if not lists:
+        keys = ", ".join(list(document)[:6]) if isinstance(document, dict) else "no frames"
+        expected = "frames of weights by name, or facsNames and weightMat"
+        raise InputError("weightMat", expected, keys or "nothing", "Export it in such a layout.")
+    return [_frame(one, names) for one in max(lists, key=len)]
+
+
+def rate_of(document: Any) -> float | None:
+    """The frames a second that a document states beside its frames, if it does."""
+    if not isinstance(document, dict):
+        return None
+    for key, value in document.items():
+        if key.lower().replace("_", "") in ("fps", "framerate", "exportfps", "samplingrate"):
+            return float(value) if _is_number(value) and 0 < value < float("inf") else None
+    inner = (rate_of(value) for value in document.values() if isinstance(value, dict))
+    return next((rate for rate in inner if rate is not None), None)
+
+
+def _names(document: Any) -> tuple[str, ...]:
+    """The longest list of texts outside of the frames: the names of their numbers."""
+    lists: list[list[str]] = []
+    _collect_names(document, lists, 0)
+    longest: list[str] = max(lists, key=len, default=[])
+    return tuple(longest)
+
+
+def _collect_names(value: Any, lists: list[list[str]], depth: int) -> None:
+    if not isinstance(value, dict) or depth > _DEEPEST:
+        return
+    for inner in value.values():
+        if isinstance(inner, list) and inner and all(isinstance(one, str) for one in inner):
+            lists.append(inner)
+        _collect_names(inner, lists, depth + 1)
+
+
+def _lists(value: Any, names: Sequence[str], depth: int = 0) -> Iterator[list[Any]]:
+    """Every list that may be one of frames."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(value, list):
+        if value and all(one is None or _may_be_frame(one, names) for one in value):
+            yield value
+    elif isinstance(value, dict):
+        for inner in value.values():
+            yield from _lists(inner, names, depth + 1)
+
+
+def _may_be_frame(value: Any, names: Sequence[str]) -> bool:
+    if isinstance(value, list):
+        numbers = len(value) == len(names) and all(map(_is_number, value))
+        return not value or _pairs(value) is not None or (numbers and bool(names))
+    return isinstance(value, dict)
+
+
+# ---- frames of other layouts than a list
+
+
+def _by_key(document: Mapping[str, Any]) -> list[Any] | None:
+    """Frames of columns, of pandas' tables, or of an object with a key a frame."""
+    if isinstance(document.get("columns"), list) and isinstance(document.get("data"), list):
+        rows = document["data"]
+        if all(isinstance(row, list) for row in rows):
+            return [dict(zip(document["columns"], row, strict=False)) for row in rows]
+    objects = [value for value in document.values() if isinstance(value, dict) and value]
+    if len(objects) == len(document) > 1:
+        if all(map(_is_numeral, document)):
+            clock = "time" if any("." in key for key in document) else "frame"
+            return [{clock: float(key), **frame} for key, frame in document.items()]
+        if all(objects[0].keys() == one.keys() for one in objects) and all(
+            map(_is_numeral, objects[0])
+        ):
+            return [{key: document[key][row] for key in document} for row in objects[0]]
+    return _of_columns(document)
+
+
+def _of_columns(document: Mapping[str, Any]) -> list[Any] | None:
+    """Frames of lists of as many numbers each."""
+    columns: dict[str, list[Any]] = {}
+    for key, value in document.items():
+        inner = value if isinstance(value, dict) else {key: value}
+        columns |= {name: one for name, one in inner.items() if _is_column(one)}
+    lengths = {len(column) for column in columns.values()}
+    if len(columns) < 2 or len(lengths) != 1 or any(_is_objects(v) for v in document.values()):
+        return None
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _is_column(value: Any) -> bool:
+    plain = isinstance(value, list) and len(value) > 1
+    return plain and all(one is None or _is_number(one) for one in value)
+
+
+def _is_objects(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(one, dict) for one in value)
+
+
+def _is_numeral(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# ---- what is in a frame
+
+
+def _frame(value: Any, names: Sequence[str]) -> Frame:
+    frame = Frame()
+    _add(frame, "", value, names, 0)
+    return frame
+
+
+def _add(frame: Frame, key: str, value: Any, names: Sequence[str], depth: int) -> None:
+    """Add what is under a key of a frame, or of an object in it."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(value, dict):
+        _add_object(frame, key, value, names, depth)
+    elif isinstance(value, list):
+        _add_list(frame, key, value, names, depth)
+    elif _is_number(value) or isinstance(value, str):
+        frame.plain[key] = value
+
+
+def _add_object(
+    frame: Frame, key: str, value: Mapping[str, Any], names: Sequence[str], depth: int
+) -> None:
+    group: dict[str, Number] = {}
+    for name, inner in value.items():
+        if depth and _is_number(inner) and role_of_name(name) is None:
+            group[name] = inner
+        else:
+            _add(frame, name, inner, names, depth + 1)
+    if depth and (group or not value):
+        frame.groups.setdefault(key, {}).update(group)
+
+
+def _add_list(
+    frame: Frame, key: str, value: Sequence[Any], names: Sequence[str], depth: int
+) -> None:
+    pairs = _pairs(value)
+    if pairs is not None:
+        frame.groups.setdefault(key, {}).update(pairs)
+    elif all(one is None or _is_number(one) for one in value):
+        _add_numbers(frame, key, value, names)
+    elif isinstance(value[0], dict | list):  # of several faces the first
+        _add(frame, key, value[0], names, depth + 1)
+
+
+def _add_numbers(frame: Frame, key: str, value: Sequence[Any], names: Sequence[str]) -> None:
+    """Add numbers that have their names beside the frames."""
+    if len(value) == len(names) and names:
+        named = zip(names, value, strict=True)
+        frame.groups.setdefault(key, {}).update({n: v for n, v in named if v is not None})
+    elif names and key.lower() in ("weights", "blendshapes", "values"):
+        expected, found = f"{len(names)} numbers, one a name", f"{len(value)}"
+        raise InputError(key, expected, found, "Export it again.")
+    elif value:
+        frame.others.add(key)
+
+
+def _pairs(value: Sequence[Any]) -> dict[str, Number] | None:
+    """Numbers by name of a list of objects that have both; None for another list."""
+    if not all(isinstance(one, dict) for one in value):
+        return None
+    pairs = {}
+    for one in value:
+        name = next(
+            (one[key] for key in _NAME_KEYS if isinstance(one.get(key), str) and one[key]), None
+        )
+        score = next((one[key] for key in _SCORE_KEYS if _is_number(one.get(key))), None)
+        if name is None or score is None:
+            return None
+        pairs[name] = score
+    return pairs
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)

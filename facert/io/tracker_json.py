@@ -1,0 +1,131 @@
+"""Takes out of the JSON of trackers, in whatever layout; see `facert.io.json_frames`.
+
+Beside the weights a frame may have its time, its number or a flag; what else is in it is left out,
+and the log names it. Curves as Audio2Face writes them are read by `facert.io.curves`.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.data.column_names import names_face, role_of_name
+from facert.data.take import Take
+from facert.errors import InputError, reading
+from facert.io.curves import holds_curves, take_of_curves
+from facert.io.guarded import read_text
+from facert.io.json_frames import Frame, Number, frames_of, parsed, rate_of
+from facert.io.table import Table
+from facert.io.table_take import Reading, listed, take_of_table
+
+log = logging.getLogger("facert")
+
+_AXES = frozenset(("x", "y", "z", "w", "pitch", "yaw", "roll", "rx", "ry", "rz"))
+_OWN = re.compile(r'\{"exportFps": [^,]*, "trackPath": "", "startTimecode": ')
+_HEAD = 256
+_LARGE, _SPARSE = 2**20, 20  # cells; of such a table one in so many must be filled
+
+
+def read_json_take(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Take:
+    """Read a JSON file as a take whose source is weights.
+
+    `fps` is for a file that states neither times nor a rate.
+
+    Raises `InputError` naming the file and the key or frame that is at fault.
+    """
+    with reading(path):
+        document = parsed(read_text(path))
+        if isinstance(document, dict) and holds_curves(document):
+            return take_of_curves(document, fps)
+        table = _table(frames_of(document))
+        return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep)))
+
+
+def is_mixed(path: Path) -> bool:
+    """Whether numbers in a JSON file may be no weights: unless facert wrote it."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        return _OWN.match(file.read(_HEAD)) is None
+
+
+def _table(frames: Sequence[Frame]) -> Table:
+    """The frames as a table: what is no weight in front, then the weights."""
+    columns = _columns(frames, _weights(frames))
+    rows: list[dict[str, Number | str]] = []
+    for frame in frames:
+        row = {name: value for name, value in frame.plain.items() if _is_read(name, columns)}
+        for key, group in frame.groups.items():
+            row.update({columns[key, n]: v for n, v in group.items() if (key, n) in columns})
+        rows.append(row)
+    names = tuple(dict.fromkeys(name for row in rows for name in row))
+    cells = len(names) * len(rows)
+    if cells > max(_LARGE, _SPARSE * sum(map(len, rows))):
+        expected = "frames that have the same names"
+        raise InputError("frames", expected, f"{len(names)} names in all", "Export it again.")
+    numbers = np.full((len(rows), len(names)), np.nan)
+    texts: dict[int, Sequence[str]] = {}
+    for column, name in enumerate(names):
+        found = _numbers([row.get(name) for row in rows])
+        if found is None:
+            texts[column] = [str(row.get(name, "")) for row in rows]
+        else:
+            numbers[:, column] = found
+    return Table(names, numbers, texts, lambda row: f"frame {row + 1}")
+
+
+def _columns(frames: Sequence[Frame], groups: Sequence[str]) -> dict[tuple[str, str], str]:
+    """A column for each name under each key; the key stands before a name that is there twice."""
+    columns: dict[tuple[str, str], str] = {}
+    taken: set[str] = set()
+    for key in groups:
+        names = dict.fromkeys(name for frame in frames for name in frame.groups.get(key, {}))
+        for name in names:
+            columns[key, name] = f"{key}.{name}" if name in taken else name
+        taken |= set(names)
+    return columns
+
+
+def _weights(frames: Sequence[Frame]) -> list[str]:
+    """The keys of groups that are weights, the largest first; none where frames are plain."""
+    counts: Counter[str] = Counter()
+    for frame in frames:
+        for key, group in frame.groups.items():
+            counts[key] += len(group)
+    plain = sum(_is_weight(name, value) for frame in frames for name, value in frame.plain.items())
+    ranked = [key for key, count in counts.most_common() if count]
+    main = ranked[:1] if ranked and counts[ranked[0]] > plain else []
+    facial = [key for key in ranked if key not in main and _is_of_face(key, frames)]
+    used = main + facial
+    left_out = {key for frame in frames for key in (*frame.groups, *frame.others)} - set(used)
+    if left_out:
+        log.info("left out, as no weights: %s", listed(sorted(left_out)))
+    return used
+
+
+def _is_weight(name: str, value: Number | str) -> bool:
+    return not isinstance(value, str) and role_of_name(name) is None
+
+
+def _is_of_face(key: str, frames: Sequence[Frame]) -> bool:
+    """Whether all numbers of a group have names of a face, other than angles and places."""
+    names = {name for frame in frames for name in frame.groups.get(key, {})}
+    return bool(names) and not names & _AXES and all(map(names_face, names))
+
+
+def _is_read(name: str, columns: Mapping[tuple[str, str], str]) -> bool:
+    """Whether a frame's own number is used: beside groups of weights only what is known."""
+    known = role_of_name(name) is not None or names_face(name)
+    return not columns or (known and name not in columns.values())
+
+
+def _numbers(cells: Sequence[Number | str | None]) -> FloatArray | None:
+    """A column of numbers, of those that are texts as well; None for one of texts."""
+    try:
+        return np.array([np.nan if cell is None else float(cell) for cell in cells])
+    except (ValueError, OverflowError):
+        return None
