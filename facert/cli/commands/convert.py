@@ -41,7 +41,10 @@ def command(
     ] = None,
     shapes: SHAPES = None,
     map_path: Annotated[
-        Path | None, file_option('New names: theirs = "ours".', "--map", metavar="TOML")
+        Path | None,
+        file_option(
+            'New names: theirs = "ours"; "Face:*" = "*" removes a prefix.', "--map", metavar="TOML"
+        ),
     ] = None,
     poses_path: Annotated[
         Path | None,
