@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,13 +10,16 @@ from itertools import chain
 
 from facert.data.labelling import Poses, labelled
 from facert.data.names import NameIndex, nearest
+from facert.data.rate import BROKEN, whole_count
 from facert.data.resampling import resampled
 from facert.data.rig import Rig
 from facert.data.spelling import composed, contrasted
 from facert.data.take import Controls, Take
-from facert.data.timecode import timecode
+from facert.data.timecode import can_drop, is_dropped, is_marked_drop, timecode
 from facert.data.units import with_units, with_up_axis
 from facert.errors import InputError
+
+log = logging.getLogger("facert")
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Changes:
     up_axis: str = ""
     """What to convert them to."""
     start_timecode: str = ""
-    """``HH:MM:SS:FF`` of the first frame, FF at the new rate."""
+    """``HH:MM:SS:FF``, or drop-frame ``HH:MM:SS;FF``, of the first frame at the new rate."""
 
     @property
     def of_frames(self) -> tuple[str, ...]:
@@ -83,10 +87,26 @@ def _in_time(take: Take, changes: Changes) -> Take:
         take = labelled(take, changes.poses)
     if changes.fps is not None:
         take = resampled(take, changes.fps)
-    start = changes.start_timecode
-    if start and not timecode(start, 0.0, take.fps):
-        raise InputError("--start-timecode", "HH:MM:SS:FF", repr(start), "Correct it.")
-    return replace(take, start_timecode=start) if start else take
+    if not changes.start_timecode:
+        return take
+    return replace(take, start_timecode=_start_timecode(changes.start_timecode, take.fps))
+
+
+def _start_timecode(start: str, fps: float) -> str:
+    """The timecode that was asked for, as it is kept; a number that there is not is refused."""
+    expected, fix = "HH:MM:SS:FF, or drop-frame HH:MM:SS;FF", "Correct it."
+    written = timecode(start, 0.0, fps)
+    if not written or is_dropped(start, fps):
+        expected = "a number that drop-frame has" if written else expected
+        raise InputError("--start-timecode", expected, repr(start), fix)
+    if not is_marked_drop(start):
+        return start
+    if not can_drop(whole_count(fps)):
+        fix = "Write a colon before FF, or give --in-fps 29.97."
+        raise InputError("--start-timecode", f"HH:MM:SS:FF at {fps:g}/s", repr(start), fix)
+    if fps not in BROKEN:
+        log.warning("drop-frame is for 29.97 frames/s and the like: this take has %g", fps)
+    return written
 
 
 def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:

@@ -18,7 +18,7 @@ AGREES = 0.01
 """Rates agree within this share."""
 
 _USUAL = (10.0, 12.0, 15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
-_AS_WRITTEN = 2e-4  # the share by which 23.98 lies from 24000/1001
+_FITS = 2e-4  # the share by which clocks go wrong
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ def standard_rate(fps: float) -> float:
     >>> standard_rate(29.9), standard_rate(30)
     (29.9, 30.0)
     """
-    near = (rate for rate in BROKEN if abs(fps - rate) <= _AS_WRITTEN * rate)
+    near = (rate for rate in BROKEN if abs(fps - rate) < 6e-4 or fps == round(rate, 2))
     return next(near, float(fps))
 
 
@@ -124,9 +124,9 @@ def _fitted(time: FloatArray) -> _Fit:
     """Fit of an even spacing to times, with rows missing; each run of rows has its own start."""
     steps = np.diff(time)
     median = float(np.quantile(steps, 0.5, method="lower"))
-    usual = float(np.mean(steps[(steps >= 0.49 * median) & (steps <= 1.5 * median)]))
-    taken = np.maximum(np.rint(steps / usual), 1)
-    clean = np.abs(steps / usual - taken) <= np.where(taken == 1, 0.5, 0.15)
+    usual = float(np.mean(steps[(steps >= 0.49 * median) & (steps <= 1.6 * median)]))
+    taken = np.where(steps < 1.6 * usual, 1.0, np.rint(steps / usual))
+    clean = np.abs(steps / usual - taken) <= np.where(taken == 1, 0.6, 0.15)
     frames = np.append(0, np.cumsum(taken))
     run = np.append(0, np.cumsum(~clean))
     x, y = _centred(frames, run), _centred(time, run)
@@ -152,5 +152,5 @@ def _broken_or_whole(shown: float, whole: float, unsure: float) -> float:
         return whole
     nearer = abs(shown - broken) < abs(shown - whole)
     told_apart = abs(shown - whole) > unsure * whole
-    fits = abs(shown - broken) <= (_AS_WRITTEN + unsure) * broken
+    fits = abs(shown - broken) <= (_FITS + unsure) * broken
     return broken if nearer and told_apart and fits else whole

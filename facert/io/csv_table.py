@@ -44,7 +44,7 @@ def read_csv_take(path: Path, fps: float | None = None, keep: Sequence[str] = ()
         if not is_livelink(header):
             return read_table(path, fps, keep)
         require_there(keep, header)
-        return read_livelink(path)
+        return read_livelink(path, fps)
 
 
 def read_table(
