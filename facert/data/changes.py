@@ -10,7 +10,7 @@ from itertools import chain
 
 from facert.data.labelling import Poses, labelled
 from facert.data.names import NameIndex, nearest
-from facert.data.rate import BROKEN, whole_count
+from facert.data.rate import BROKEN, standard_rate, whole_count
 from facert.data.resampling import resampled
 from facert.data.rig import Rig
 from facert.data.spelling import composed, contrasted
@@ -86,7 +86,7 @@ def _in_time(take: Take, changes: Changes) -> Take:
     if changes.poses is not None:
         take = labelled(take, changes.poses)
     if changes.fps is not None:
-        take = resampled(take, changes.fps)
+        take = resampled(take, standard_rate(changes.fps))
     if not changes.start_timecode:
         return take
     return replace(take, start_timecode=_start_timecode(changes.start_timecode, take.fps))

@@ -46,7 +46,6 @@ def resampled(take: Take, fps: float) -> Take:
     """
     if not (np.isfinite(fps) and fps > 0):
         raise InputError("--fps", "a positive number", f"{fps}", "Give the rate of the output.")
-    fps = standard_rate(fps)
     start = recounted(take.start_timecode, take.fps, fps)
     agrees = abs(take.fps - fps) <= AGREES * fps
     places = frames_at(take.time, fps, _SAME * fps) if agrees else None

@@ -142,7 +142,7 @@ def test_a_blink_stays_at_its_second_for_ten_minutes(tmp_path: Path, clock: str)
     assert_there(np.arange(len(by_row)) / document["exportFps"], by_row, clock)
     back = formats.read_take_file(tmp_path / "a.csv")
     assert_there(back.time, back.source.values[:, 0], clock)
-    for fps in (24.0, 25.0, 29.97, 30.0, 60.0):
+    for fps in (24.0, 25.0, NTSC, 30.0, 60.0):
         found = resampled(take, fps)
         assert_there(np.arange(len(found)) / found.fps, found.source.values[:, 0], clock)
 
