@@ -73,6 +73,8 @@ def read_any(
     found = format_of(path, "read", "take", "rig")
     if found is None:
         raise unknown_input(path)
+    if path.is_file() and not path.name.lower().endswith(found.endings):
+        log.warning("%s: read as %s, which it is by its content", path.name, found.endings[0])
     held = function(found.kind_of)(path, kind) if found.kind_of else next(iter(found.read))
     reader = function(found.read[held])
     if held == "take" and target and not _has_targets(found):

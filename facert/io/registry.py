@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from facert.errors import InputError, OutputExistsError
+from facert.io.content import endings_by_content
 
 Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
 Use = Literal["read", "write"]
@@ -95,6 +96,12 @@ FORMATS = (
         writes="poses (else source weights)",
     ),
     Format((".txt",), {"take": "facecap.read_facecap"}, about=" of Face Cap", reads="Face Cap"),
+    Format(
+        (".tsv", ".tab"),
+        {"take": "csv_table.read_csv_take"},
+        mixed="csv_table.is_mixed",
+        reads="the same as `.csv`, between tabs",
+    ),
     Format((".c3d",), {"take": "c3d.read_c3d"}, reads="markers"),
     Format(
         (".trc",),
@@ -170,11 +177,20 @@ def endings(use: Use, *kinds: Kind) -> tuple[str, ...]:
 
 
 def format_of(path: Path, use: Use, *kinds: Kind) -> Format | None:
-    """The format that the name's ending stands for, of those with one of these kinds."""
+    """The format of those with one of these kinds that the name's ending stands for.
+
+    Of a file that is read, the content counts where the ending says nothing or something else.
+    """
     folder = use == "read" and path.is_dir()
     name = FOLDER if folder else path.name.lower() if path.suffix else ""
-    able = (one for one in FORMATS if one.functions(use).keys() & set(kinds))
-    return next((one for one in able if name.endswith(one.endings)), None)
+    able = [one for one in FORMATS if one.functions(use).keys() & set(kinds)]
+    found = next((one for one in able if name.endswith(one.endings)), None)
+    if use == "write" or not path.is_file():
+        return found
+    held = set(endings_by_content(path, likely=found is None))
+    if not held or (found and held & set(found.endings)):
+        return found
+    return next((one for one in able if held & set(one.endings)), found)
 
 
 def function(name: str) -> Callable[..., Any]:
@@ -212,7 +228,8 @@ def write(kind: Kind, thing: object, path: Path, overwrite: bool = False) -> Non
 def unknown_input(path: Path) -> InputError:
     """The error for a file that holds no take or rig by its ending, with what to do about it."""
     known = f"{', '.join(endings('read', 'take', 'rig'))}, or a folder of .obj files"
-    advice = _ADVICE.get(path.suffix.lower(), "Export it in one of these formats.")
+    known_by = (path.suffix.lower(), *endings_by_content(path, likely=True))
+    advice = next(filter(None, map(_ADVICE.get, known_by)), "Export it in one of these formats.")
     return InputError("kind of file", known, _ending(path), advice, where=str(path))
 
 
