@@ -33,7 +33,7 @@ class Change:
     # Texts, the first of which occurs once in the file
     old: str
     new: str
-    tests: Sequence[str]  # Files in the folder tests
+    tests: Sequence[str]  # Files in the folder tests, or file::test
     reason: str | None = None  # Why no test can notice
 
     @property

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-
 import pytest
 
 from experiments.mutants.listed import ROOT, changes
@@ -12,17 +10,17 @@ CHANGES = changes()
 ROOMS = ("models", "methods", "topology", "preprocess")
 
 
-def test_each_change_fits_its_file_and_leaves_python():
+def test_each_change_fits_its_file():
     for change in CHANGES:
-        text = (ROOT / "facert" / change.file).read_text(encoding="utf-8")
-        changed = ast.parse(change.applied(text))
-        assert ast.dump(changed) != ast.dump(ast.parse(text)), change.what
+        change.applied((ROOT / "facert" / change.file).read_text(encoding="utf-8"))
 
 
 def test_each_change_has_tests_that_exist_and_a_name_of_its_own():
     for change in CHANGES:
         assert change.tests, change.what
-        assert all((ROOT / "tests" / test).is_file() for test in change.tests), change.what
+        for test in change.tests:
+            path, _, name = test.partition("::")
+            assert name in (ROOT / "tests" / path).read_text(encoding="utf-8"), change.what
         assert change.room in ROOMS
     assert len({change.what for change in CHANGES}) == len(CHANGES)
 

@@ -110,24 +110,24 @@ def test_what_is_minimised_is_equation_4_with_the_prior_of_equation_5(data, trai
 
 @pytest.fixture
 def begun(data, monkeypatch):
-    """The latent coordinates at which a method begins to train."""
+    """The latent coordinates at which a method begins to train, and the tolerance."""
 
     def of(method):
         found = []
 
         def note(module, *given, **options):
-            found.append(module.Z.detach().numpy().copy())
+            found.append((module.Z.detach().numpy().copy(), options["tolerance"]))
             return train(module, *given, **options)
 
         train = shared_gplvm.train
         monkeypatch.setattr(shared_gplvm, "train", note)
-        return fitted(data, method, iterations=1)[0], found[0]
+        return fitted(data, method, iterations=1)[0], *found[0]
 
     return of
 
 
 def test_the_supervised_model_begins_at_the_principal_components_of_both_views(data, begun):
-    method, Z = begun("sgplvm")
+    method, Z, _ = begun("sgplvm")
     joined = np.hstack(views(data, method))
     joined -= joined.mean(axis=0)
     variances, axes = np.linalg.eigh(joined.T @ joined / len(joined))
@@ -138,7 +138,8 @@ def test_the_supervised_model_begins_at_the_principal_components_of_both_views(d
 
 def test_the_semi_supervised_model_begins_at_the_alignment_of_both_views(data, begun):
     """Ham, Lee and Saul (2005): the eigenvectors of MᵀM after the constant one."""
-    method, Z = begun("ssgplvm")
+    method, Z, tolerance = begun("ssgplvm")
+    assert tolerance == method.settings.tolerance
     M = constraints(*views(data, method))
     values, vectors = np.linalg.eigh(M.T @ M)
     assert values[0] < 1e-9 < values[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -71,6 +72,15 @@ def test_poses_lie_between_those_of_the_experts(auto):
     np.testing.assert_allclose(
         pose, sum(w * s for w, s in zip(map_.weights, predicted, strict=True))
     )
+
+
+def test_the_variance_is_that_of_the_experts_weighted_alike(auto):
+    """Of processes their own, of the shrunk factors their error in cross-validation."""
+    map_, X = auto.map_, data()[2].X
+    weights = np.array([0.1, 0.2, 0.3, 0.4])
+    of_processes = [p(X)[1]() for p in (map_.plain, map_.whitened, map_.residual)]
+    expected = np.tensordot(weights[[0, 1, 3]], of_processes, axes=1) + 0.3 * map_.factor_error**2
+    np.testing.assert_allclose(replace(map_, weights=weights)(X)[1](), expected, rtol=1e-9)
 
 
 def test_no_pose_leaves_the_range_of_those_that_are_known(auto):
@@ -153,6 +163,15 @@ def test_weights_are_the_best_shares(seed):
     best = cost(blend_weights(missed))
     for shares in np.random.default_rng(seed).dirichlet(np.ones(4), 200):
         assert cost(shares) >= best
+
+
+@pytest.mark.parametrize("worse", [1.0, 2.0, 9.0])
+def test_two_experts_whose_errors_are_unrelated_share_by_their_squares(worse):
+    """The Lagrangian's minimum: w₁ (E₁ + ρ E) = w₂ (E₂ + ρ E), E the lesser, ρ = 0.3."""
+    errors = np.array([[1.0, 0.0]]), np.array([[0.0, worse**0.5]])
+    first, second = blend_weights(errors)
+    assert first * 1.3 == pytest.approx(second * (worse + 0.3))
+    assert first + second == pytest.approx(1.0)
 
 
 def test_the_unit_of_the_errors_does_not_matter():

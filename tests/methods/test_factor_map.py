@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from facert.data.arrays import rms
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.blend import BaseMaps, cross_validated_poses
 from facert.methods.factors import FactorMap
@@ -102,3 +103,41 @@ def test_cross_validated_poses_are_those_of_maps_without_the_fold():
     rest = Labelled(labelled.X[train], labelled.Y[train])
     maps = BaseMaps.learn(rest, Unlabelled(frames, unlabelled.Y))
     np.testing.assert_array_equal(maps(labelled.X[test]), predicted[:, test])
+
+
+def test_the_search_for_factors_begins_between_both_processes(monkeypatch):
+    labelled, unlabelled = data()
+    begun, learn = [], FactorMap.learn
+
+    def note(labelled, unlabelled, guess):
+        begun.append(guess)
+        return learn(labelled, unlabelled, guess)
+
+    monkeypatch.setattr(FactorMap, "learn", note)
+    maps = BaseMaps.learn(labelled, unlabelled)
+    both = [process(unlabelled.X)[0] for process in (maps.plain, maps.whitened)]
+    np.testing.assert_allclose(begun[0], np.mean(both, axis=0))
+
+
+def learned(labelled, unlabelled):
+    """Factors begun at a linear regression."""
+    ones = [np.column_stack([view.X, np.ones(len(view.X))]) for view in (labelled, unlabelled)]
+    slopes, *_ = np.linalg.lstsq(ones[0], labelled.Y)
+    return FactorMap.learn(labelled, unlabelled, ones[1] @ slopes)
+
+
+def test_poses_that_are_closed_half_of_the_time_are_predicted_around_their_free_mean():
+    """It is far below the mean of the poses themselves."""
+    labelled, unlabelled = data(labels=20)
+    found = learned(labelled, unlabelled)
+    assert (found.offset < np.vstack([labelled.Y, unlabelled.Y]).mean(axis=0) - 0.3).all()
+    assert rms(found(labelled.X)[0] - labelled.Y) < 0.15 * labelled.Y.std()
+
+
+def test_poses_and_their_limits_may_lie_anywhere():
+    labelled, unlabelled = data(labels=20)
+    moved = learned(
+        Labelled(labelled.X, labelled.Y - 7.0), Unlabelled(unlabelled.X, unlabelled.Y - 7.0)
+    )
+    expected = learned(labelled, unlabelled)(labelled.X)[0] - 7.0
+    np.testing.assert_allclose(moved(labelled.X)[0], expected, atol=1e-8)

@@ -98,3 +98,15 @@ def test_it_is_kept_with_the_model(name, trained):
     loaded = make_method(Settings(method=name))
     loaded.load(trained(name).save())
     np.testing.assert_allclose(loaded.predict(X).std, trained(name).predict(X).std)
+
+
+def test_the_variance_of_filled_numbers_is_carried_on_by_the_linear_map():
+    """var(x A) = Σ_d var(x_d) A_d², beside what the frame itself leaves open."""
+    rng = np.random.default_rng(0)
+    X, A = rng.normal(size=(200, 6)), rng.normal(size=(6, 3))
+    method = make_method(Settings(method="gpr-linear"))
+    method.fit(Labelled(X[:40], X[:40] @ A), Unlabelled(X[40:], X[40:] @ A))
+    variance = rng.random((20, 6))
+    plain, filled = method.predict(X[:20]), method.predict(X[:20], variance)
+    np.testing.assert_allclose(filled.Y, plain.Y)
+    np.testing.assert_allclose(filled.std**2 - plain.std**2, variance @ A**2, rtol=1e-3)

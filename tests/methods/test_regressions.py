@@ -38,6 +38,13 @@ def test_a_linear_truth_is_recovered(name):
     np.testing.assert_allclose(predicted, Y[30:], atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["ridge", "gpr-linear"])
+def test_a_linear_truth_goes_on_far_beyond_the_labels(name):
+    X, Y = linear_data(n=60)
+    predicted = fitted(name, X[:30], Y[:30]).predict(1e3 * X[30:]).Y
+    np.testing.assert_allclose(predicted, 1e3 * Y[30:], atol=1.0)
+
+
 @pytest.mark.parametrize("name", ["ridge", "pls", "gpr-linear"])
 def test_noise_is_not_followed(name):
     X, clean = linear_data(n=90)

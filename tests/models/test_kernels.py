@@ -107,6 +107,16 @@ def test_the_noise_never_falls_below_its_floor(kernel):
     assert type(kernel).from_log(log_kernel, 0.05).noise == 0.05
 
 
+def test_the_noise_is_the_floor_and_what_is_above_it(kernel):
+    """And so it stays when training begins at a trained kernel."""
+    log_kernel = np.log([1.2, 0.4, 0.02])
+    made = type(kernel).from_log(log_kernel, 0.05)
+    assert made.noise == pytest.approx(0.07)
+    np.testing.assert_allclose(made.to_log(0.05), log_kernel)
+    at_floor = type(kernel)(1.2, 0.4, 0.05).to_log(0.05)
+    assert type(kernel).from_log(at_floor, 0.05).noise == pytest.approx(0.05, rel=0.01)
+
+
 def test_the_help_names_every_kernel():
     _, about = DESCRIBED["source_kernel"]
     assert all(name in about.help for name in KERNELS)

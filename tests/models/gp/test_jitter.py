@@ -37,3 +37,17 @@ def test_numbers_that_are_none_are_not_taken_for_a_lack_of_jitter():
         K[2, 2] = wrong
         with pytest.raises(NumericalError, match="NaN or infinity"):
             lower_factor(K)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("lack", "least"), [(0.0, 0.0), (3e-11, 1e-10), (3e-9, 1e-8)])
+def test_no_more_jitter_is_added_than_a_matrix_lacks_whatever_its_unit(scale, lack, least):
+    """By factors of a hundred, relative to the mean of the diagonal."""
+    directions, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(8, 8)))
+    values = np.array([2.0, 2.0, 1.0, 1.0, 1.0, 0.5, 0.5, 1e-3])
+    values[-1] = -lack if lack else values[-1]
+    K = scale * (directions * values) @ directions.T
+    K = (K + K.T) / 2.0
+    L = np.tril(lower_factor(K))
+    added = np.diag(L @ L.T - K) / K.diagonal().mean()
+    np.testing.assert_allclose(added, least, rtol=0.1, atol=1e-14)

@@ -149,6 +149,15 @@ def test_the_decrease_is_judged_by_the_magnitude_that_is_given(optimiser):
     assert few.iterations < many.iterations
 
 
+def test_a_magnitude_below_the_objectives_own_changes_nothing():
+    results = [
+        train(make_module(), LBFGS(), monitor=Monitor(), magnitude=magnitude, **OPTIONS)
+        for magnitude in (1.0, 50.0)
+    ]
+    assert results[0].value > 50.0
+    assert results[0].iterations == results[1].iterations
+
+
 @pytest.mark.parametrize(
     ("curve", "converged"),
     [

@@ -221,3 +221,10 @@ def test_observations_and_the_previous_frame_are_weighed_by_their_precisions():
     observed = Observation.of(np.array([[1.0]]), 0.1).following(np.array([[0.0]]), 0.2)
     assert observed.mean[0, 0] == pytest.approx(0.8)
     assert observed.variance[0, 0] == pytest.approx(1 / (100 + 25))
+
+
+def test_what_was_filled_in_is_as_uncertain_as_it_is_said_to_be():
+    """Beside the noise of a measurement, and what was not seen stays unknown."""
+    frame, filled = np.array([[1.0, 2.0, np.nan]]), np.array([[0.0, 0.5, np.nan]])
+    observed = Observation.of(frame, 0.1, filled)
+    np.testing.assert_allclose(observed.variance, [[0.01, 0.51, np.inf]])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from facert.data.normalisation import Normalisation
 from facert.models.gplvm.fitting import train
 from facert.models.gplvm.initial_latents import align
 from facert.models.gplvm.lle import constraint_matrix, view_rows
@@ -79,3 +80,13 @@ def test_rows_of_the_core_stay_and_the_others_are_placed_where_their_view_explai
     for Z_view, view, posterior in zip((Z[: len(X)], Z_y), (X, Y), posteriors, strict=True):
         error = np.abs(posterior.predict(Z_view).mean - view)
         assert error.mean() < 0.1 * view.std()
+
+
+def test_kernels_in_other_units_are_those_of_the_observations_divided(trained):
+    """K of observations divided by a unit is K divided by its square."""
+    _, module = trained
+    units = Normalisation(np.zeros(12), 3.0), Normalisation(np.zeros(8), 0.2)
+    begin = TrainedViews(*module.posteriors(), *units)
+    for view, unit, kernel in zip((begin.source, begin.target), units, begin.kernels, strict=True):
+        expected = view.kernel.gram(view.Z) / unit.scale**2
+        np.testing.assert_allclose(kernel.gram(view.Z), expected, rtol=1e-12)

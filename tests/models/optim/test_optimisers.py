@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import rosen, rosen_der
 
 from facert.errors import NumericalError
-from facert.models.optim.lbfgs import LBFGS
+from facert.models.optim.lbfgs import LBFGS, _Stage
+from facert.models.optim.optimiser import State
 from facert.models.optim.scg import SCG
 
 STAGE = 10
@@ -158,3 +159,18 @@ def test_the_start_is_not_changed(optimiser):
     x = np.array([-1.2, 1.0])
     minimise(optimiser, rosenbrock, x, 20)
     np.testing.assert_array_equal(x, [-1.2, 1.0])
+
+
+def test_in_place_of_infinity_a_line_search_sees_a_parabola_with_the_slope_that_is_known():
+    """Its minimum is a tenth of the way."""
+    x, gradient = np.array([1.0, -2.0, 0.5]), np.array([3.0, 1.0, -1.0])
+    state = State(x, 7.0, float(np.linalg.norm(gradient)), 0)
+    stage = _Stage(lambda at: (7.0 if (at == x).all() else np.inf, gradient), state, go_on)
+    stage.evaluate(x)
+    step = -0.7 * gradient
+    value, slope = stage.evaluate(x + step)
+    along, beyond = float(gradient @ step), float(slope @ step)
+    curvature = value - state.value - along  # of 7 + along t + curvature t²
+    assert along + 2.0 * curvature == pytest.approx(beyond)
+    assert -along / (2.0 * curvature) == pytest.approx(0.1)
+    np.testing.assert_allclose(slope / np.linalg.norm(slope), step / np.linalg.norm(step))
