@@ -15,6 +15,8 @@ from facert.data.clock import put_together
 from facert.data.column_names import Role, is_letter, names_face, role_of_name, unit_of_name
 from facert.data.columns import rises
 from facert.data.rate import nominal_rate
+from facert.data.timecode import TICKS
+from facert.data.timecode_column import read_timecodes
 from facert.errors import InputError
 from facert.io.clock_text import codes_of_texts, is_time, seconds_of_texts
 from facert.io.table import Table
@@ -36,7 +38,6 @@ _USUAL_RATES, _RATES = (10.0, 250.0), (1.0, 250.0)
 _FASTEST = 1000.0
 _ENOUGH, _SHAPED = 5, 10  # rows that show a unit, and a clock without a name
 _REGULAR = 0.5  # of the usual step, by which most others differ at most
-_COUNTS = (24, 25, 30, 48, 50, 60, 100, 120)  # FF of a timecode
 _LATE = 1e5  # seconds: a clock that begins later counts from elsewhere
 
 
@@ -217,7 +218,7 @@ def _text_clock(table: Table, column: int, fps: float | None) -> Clock:
         if not is_time(text):
             found = repr(text[:40]) if text else "a blank"
             raise table.error(row, column, "a time in numbers, as HH:MM:SS.mmm or a date", found)
-    if codes_of_texts(texts) is not None:
+    if codes_of_texts(texts):
         return _code_clock(table, column, fps)
     seconds = seconds_of_texts(texts)
     log.info("%r is taken for times of the clock, from the first row on", name)
@@ -226,14 +227,10 @@ def _text_clock(table: Table, column: int, fps: float | None) -> Clock:
 
 
 def _code_clock(table: Table, column: int, fps: float | None) -> Clock:
-    """The clock of timecodes, whose FF count frames at the rate or at the next usual one."""
-    name, texts = table.names[column], table.texts[column]
-    found = codes_of_texts(texts)
-    assert found is not None  # as was asked before
-    whole, frames = found
-    usual = (count for count in _COUNTS if count > frames.max())
-    count = round(fps) if fps is not None else next(usual, frames.max() + 1)
-    log.info("%r is taken for timecodes of %g frames a second; --in-fps overrules it", name, count)
-    seconds = whole + frames / count
-    time = put_together(seconds - seconds[0], table.numbers)
-    return Clock(time, fps or nominal_rate(time), column, float(seconds[0]), texts[0])
+    """The clock of timecodes, by what their FF count."""
+    log.info("%r is taken for timecodes", table.names[column])
+    clock = read_timecodes(codes_of_texts(table.texts[column]), fps)
+    assert clock is not None  # they have FF, as was asked before
+    time = put_together(clock.seconds, table.numbers)
+    rate = nominal_rate(time)
+    return Clock(time, rate, column, clock.first_ticks / TICKS, clock.start(rate))

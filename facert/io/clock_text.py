@@ -13,16 +13,17 @@ from datetime import UTC, datetime
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.timecode import Code, parts_of
 
 DAY = 86400.0
 
 _OF_DAY = re.compile(r"(?:(\d+) days? )?(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)")
-_CODE = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d)[:;](\d{1,3}(?:\.\d+)?)")
+_FF = 2  # digits
 
 
 def is_time(text: str) -> bool:
     """Whether a text is a time of the day, a date with a time, or a timecode."""
-    return _CODE.fullmatch(text) is not None or not np.isnan(_seconds(text))
+    return bool(codes_of_texts([text])) or not np.isnan(_seconds(text))
 
 
 def seconds_of_texts(texts: Sequence[str]) -> FloatArray:
@@ -30,13 +31,15 @@ def seconds_of_texts(texts: Sequence[str]) -> FloatArray:
     return _past_midnight(np.array([_seconds(text) for text in texts]))
 
 
-def codes_of_texts(texts: Sequence[str]) -> tuple[FloatArray, FloatArray] | None:
-    """Whole seconds and FF of timecodes, (T,) each; None unless all are timecodes."""
-    found = [_CODE.fullmatch(text) for text in texts]
-    if None in found:
-        return None
-    parts = np.array([match.groups() for match in found if match], dtype=np.float64)
-    return _past_midnight(parts[:, :3] @ (3600.0, 60.0, 1.0)), parts[:, 3]
+def codes_of_texts(texts: Sequence[str]) -> list[Code]:
+    """The parts of timecodes with FF; empty unless all are timecodes."""
+    found = [code for code in map(parts_of, texts) if code is not None and _has_frames(code)]
+    return found if len(found) == len(texts) else []
+
+
+def _has_frames(code: Code) -> bool:
+    """Whether a timecode has FF, and no decimals of the second."""
+    return bool(code.frame) and (code.mark in ":;" or len(code.frame) == _FF)
 
 
 def _seconds(text: str) -> float:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.clock import put_together
 from facert.data.rate import standard_rate
 from facert.data.take import Source, Take, named_curves
 from facert.errors import InputError, reading
@@ -56,6 +57,7 @@ def take_of_curves(document: Mapping[str, Any], fps: float | None = None) -> Tak
     time = np.arange(len(values)) / rate
     if "time" in document:
         time = _numbers(document["time"], "time")
+        time = put_together(time, values) if time.shape == (len(values),) else time
     return Take(
         time=time,
         source=Source(values, names),
