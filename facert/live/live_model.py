@@ -124,6 +124,8 @@ class LiveModel:
     ) -> None:
         self._file, self._pattern, self._fps = file, pattern, fps
         self._options = options or (lambda _: RetargetOptions())
+        _require_fit(retargeter, pattern)
+        self._columns = retargeter.layout.columns(pattern.source.names)  # of each model to come
         self._loaded = self._prepare(retargeter)
         self._next: Loaded | None = None
         self._times: list[float] = []
@@ -215,18 +217,16 @@ class LiveModel:
             loaded.calibrate(self._rest)
 
     def _with_streams(self, retargeter: Retargeter, options: RetargetOptions) -> Loaded:
-        names = self._pattern.source.names
-        stream = retargeter.stream(names, self._fps, options)
+        stream = retargeter.stream(self._columns, self._fps, options)
         fixed_noise, motion = options, retargeter.motion
         if options.sigma is None and motion is not None:  # a twin has no noise to measure
             sigma = motion.sigma * retargeter.source_units.scale
             fixed_noise = replace(options, sigma=sigma)
-        twin = retargeter.stream(names, self._fps, fixed_noise)
+        twin = retargeter.stream(self._columns, self._fps, fixed_noise)
         return Loaded(retargeter, options, stream, twin, self._fps)
 
     def _prepare(self, retargeter: Retargeter) -> Loaded:
         """A stream for the session's frames, after one that made all code and caches warm."""
-        _require_fit(retargeter, self._pattern)
         rest = retargeter.source_units.mean
         if retargeter.source_kind == "markers":
             rest = rest.reshape(-1, 3)
@@ -256,6 +256,7 @@ class LiveModel:
             )
             fix = "Stop, and begin again with this model."
             raise InputError(field, f"the {what}", "others", fix, str(self._file.path))
+        _require_fit(retargeter, self._pattern)
         return self._prepare(retargeter)
 
 

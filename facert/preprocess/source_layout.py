@@ -24,6 +24,7 @@ class SourceColumns:
     # (d_x,): Of each column among the numbers of a frame; any for those that the source lacks
     index: IntArray
     absent: IntArray  # (a,): The columns that it lacks
+    count: int  # Of the source's names
 
     def pick(self, X: FloatArray) -> FloatArray:
         """Frames (T, d), or one (d,), in the model's order; NaN in absent columns."""
@@ -50,26 +51,27 @@ class SourceLayout:
         """Numbers of each marker or weight, 3 or 1."""
         return 3 if self.kind == "markers" else 1
 
-    def columns(self, names: Sequence[str]) -> SourceColumns:
+    def columns(self, names: Sequence[str], quiet: bool = False) -> SourceColumns:
         """The model's columns in a source with these names.
 
         A marker that the source lacks is one that was not observed: the job goes on, with a
-        warning. Where it has unknown names instead, or lacks most, it is misspelt or another set.
+        warning unless it is to be `quiet`. Where it has unknown names instead, or lacks most, it is
+        misspelt or another set.
 
         Raises
         ------
         InputError
             For misspelt names, names of another set, or of two subjects.
         """
-        index = NameIndex.among(names, self.names, "/source/names")
+        index = NameIndex.among(names, self.names, "/source/names", quiet=quiet)
         absent = [name for name in self.names if index.find(name) is None]
         present = [name for name in self.names if index.find(name) is not None]
         extra = len(names) - len(present)
         if absent and (extra or len(absent) > len(present)):
             index.places(absent, "/source/names")  # names which, and the nearest name
-        if absent:
+        if absent and not quiet:
             log.warning("taken as not observed, as the take lacks them: %s", ", ".join(absent))
-        if extra:
+        if extra and not quiet:
             log.info("%d names of the source are not in the model: passed over", extra)
         seen = np.isin(self.names, present)
         places = np.zeros(len(self.names), dtype=np.int64)
@@ -79,6 +81,7 @@ class SourceLayout:
             self.names,
             (places[:, None] * self.width + numbers).ravel(),
             np.flatnonzero(np.repeat(~seen, self.width)),
+            len(names),
         )
 
     def arrange(self, source: Source) -> Source:

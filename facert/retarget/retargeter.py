@@ -22,6 +22,7 @@ from facert.models.threads import threads_for
 from facert.preprocess.clean_source import clean_source
 from facert.preprocess.motion.estimate import FEWEST
 from facert.preprocess.motion.series import even_grid
+from facert.preprocess.source_layout import SourceColumns
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import novelty_warning, relative_residuals, usual_variance
@@ -89,7 +90,7 @@ class Retargeter(TrainedModel):
 
     def stream(
         self,
-        names: Sequence[str],
+        names: Sequence[str] | SourceColumns,
         fps: float | None = None,
         options: RetargetOptions | None = None,
         rest: FloatArray | None = None,
@@ -129,7 +130,8 @@ class Retargeter(TrainedModel):
         """Map one frame after the other, as they would come live."""
         whole = replace(options, smooth=False)  # what is looked at beforehand is not smoothed
         rest = clean_source(take, self.layout, self.source_units, self.neutral, whole).rest
-        stream = self.stream(take.source.names, 1.0 / even_grid(take.time)[1], options, rest)
+        columns = self.layout.columns(take.source.names, quiet=True)  # cleaning logged it
+        stream = self.stream(columns, 1.0 / even_grid(take.time)[1], options, rest)
         with threads_for(1):
             steps = [stream.step(frame).complete() for frame in take.source.values]
         stds = [step.std for step in steps if step.std is not None]

@@ -15,6 +15,7 @@ from facert.preprocess.faults import FaultDetector
 from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
+from facert.preprocess.source_layout import SourceColumns
 from facert.retarget.model import TrainedModel
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
 
@@ -63,8 +64,8 @@ class RetargetStream:
     Parameters
     ----------
     model : TrainedModel
-    names : sequence of str
-        Names of the source's markers or weights.
+    names : sequence of str or SourceColumns
+        Names of the source's markers or weights, or where the model's are among them.
     fps : float, optional
         Frames a second; by default that of the training take.
     options : RetargetOptions, optional
@@ -81,7 +82,7 @@ class RetargetStream:
     def __init__(
         self,
         model: TrainedModel,
-        names: Sequence[str],
+        names: Sequence[str] | SourceColumns,
         fps: float | None = None,
         options: RetargetOptions | None = None,
         rest: FloatArray | None = None,
@@ -91,10 +92,11 @@ class RetargetStream:
             raise InputError("fps", "a number above 0", repr(fps), "Give the true rate.")
         markers = model.layout.kind == "markers"
         self._model = model
-        self._shape = (len(names), 3) if markers else (len(names),)
+        self._columns = names if isinstance(names, SourceColumns) else model.layout.columns(names)
+        count = self._columns.count
+        self._shape = (count, 3) if markers else (count,)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
-        self._columns = model.layout.columns(names)
-        self._watch = FaultDetector(len(names)) if options.detect and markers else None
+        self._watch = FaultDetector(count) if options.detect and markers else None
         self._new_filter = partial(_filter, model, fps, options)
         self._filter = self._new_filter()
         self._noise: float | None = None

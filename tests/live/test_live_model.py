@@ -194,3 +194,13 @@ def test_a_new_model_goes_on_at_the_rate_that_was_measured(models, path, take):
     model.step(frames(take)[70])
     assert model.retargeter.settings.method == "nearest"
     assert model._loaded.fps == pytest.approx(120.0)
+
+
+def test_a_prefix_is_seen_through_and_logged_once(path, take, caplog):
+    caplog.set_level(logging.INFO)
+    names = [f"Actor1:{name}" for name in take.source.names]
+    model = opened(path, take, frame_pattern(names, "markers", take.units))
+    expected = facert.load(path).stream(take.source.names, take.fps)
+    for frame in frames(take)[:5]:
+        np.testing.assert_array_equal(model.step(frame).params, expected.step(frame.values).params)
+    assert caplog.text.count("without the prefix 'Actor1:'") == 1
