@@ -205,3 +205,40 @@ def test_strays_are_named_with_their_frames(face, as_take, caplog):
     np.testing.assert_array_equal(~hidden.valid, at(face.shape, (slice(120, 210), 10)))
     line = "m10 in 90 frames from 120 is far from where the other markers put it"
     assert f"{line}: taken as not observed" in caplog.text
+
+
+SENTINELS = (-50.0, -100.0, 9999.0, -9999.0, -16512.0, 1e6, 999.9, 1e30)
+
+
+@pytest.mark.parametrize("value", SENTINELS)
+@pytest.mark.parametrize("axes", [slice(None), 1])
+def test_what_is_written_for_a_lost_marker_is_hidden_wherever_it_stands(face, head, value, axes):
+    markers = head.apply(face)
+    places = [(slice(0, 30), 4), (slice(50, 51), 9), (slice(60, 380), 12), (slice(None), 16)]
+    for frames, marker in places:
+        markers[frames, marker, axes] = value
+    np.testing.assert_array_equal(find_faults(source(markers)).any, at(face.shape, *places))
+
+
+@pytest.mark.parametrize("value", [0.0, *SENTINELS])
+def test_it_is_hidden_where_everything_else_is_still(face, value):
+    still = np.repeat(face[:1], 60, axis=0)
+    still[10:40, 7] = value
+    expected = at(still.shape, (slice(10, 40), 7))
+    np.testing.assert_array_equal(find_faults(source(still)).any, expected)
+    still[20:30] = value  # of all markers: no face
+    np.testing.assert_array_equal(
+        find_faults(source(still)).any, expected | at(still.shape, (slice(20, 30), slice(None)))
+    )
+
+
+def test_a_marker_on_the_shoulder_and_one_a_kilometre_away(face, head, as_take, caplog):
+    body = np.array([40.0, -60.0, 10.0]) + 0.1 * face[:, 5:7]
+    markers = np.concatenate([head.apply(face), body], axis=1)
+    assert not find_faults(source(markers)).any.any()
+    markers[77, 3, 2] = 1e5
+    np.testing.assert_array_equal(
+        find_faults(source(markers)).absurd, at(markers.shape, (slice(77, 78), 3))
+    )
+    without_faults(as_take(markers))
+    assert "m3 at frame 77 is (" in caplog.text

@@ -17,6 +17,8 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.mesh.rigid import align
 from facert.models.gaussian import Gaussian
 from facert.preprocess.faults.prediction import off, spread_rows
+from facert.preprocess.faults.quantiles import median, quantile
+from facert.preprocess.faults.runs import whole_runs
 
 FEWEST = 5
 """With fewer markers the rest of the face predicts too little."""
@@ -76,11 +78,11 @@ class _Expectation:
         away = off(self.gaussian, markers, strays)
         steps = np.linalg.norm(np.diff(markers, axis=0), axis=2)
         steps[strays[1:] | strays[:-1]] = np.nan
-        usual = np.nan_to_num(_quantile(steps.T, FAST), posinf=0.0)
+        usual = np.nan_to_num(quantile(steps.T, FAST), posinf=0.0)
         jump = np.zeros_like(away)
         jump[1:] = np.abs(np.diff(away, axis=0))
         jump[:-1] = np.maximum(jump[:-1], jump[1:])
-        return _whole_runs(strays, (away > SURE * self.size) | (jump > usual))
+        return whole_runs(strays, (away > SURE * self.size) | (jump > usual))
 
 
 def far_from_expected(markers: FloatArray) -> BoolArray:
@@ -124,7 +126,7 @@ def _expectation(markers: FloatArray, size: float, change: FloatArray) -> _Expec
         smoothed = gaussian.covariance + (NOISE * size) ** 2 * np.eye(len(gaussian.mean))
         gaussian = Gaussian(gaussian.mean, smoothed)
         away = off(gaussian, markers, suspect)
-        usual = _median(np.where(suspect | hidden, np.nan, away).T)
+        usual = median(np.where(suspect | hidden, np.nan, away).T)
         expectation = _Expectation(gaussian, size, np.maximum(least, TIMES * usual))
         before, suspect = suspect, expectation.strays(markers, suspect)
         suspect &= (hidden | suspect).mean(axis=0) < MOST  # else nothing would be left of it
@@ -142,9 +144,9 @@ def _distances(markers: FloatArray) -> tuple[float, FloatArray]:
     squares = (markers**2).sum(axis=2)[:, :, None] + (others**2).sum(axis=2)[:, None]
     squares -= 2.0 * markers @ others.transpose(0, 2, 1)
     distances = np.sqrt(np.maximum(squares, 0.0))
-    usual = _median(distances.transpose(1, 2, 0))
+    usual = median(distances.transpose(1, 2, 0))
     size = float(np.nanmedian(usual[usual > 0.0])) if (usual > 0.0).any() else 0.0
-    return size, _median(np.abs(distances - usual))
+    return size, median(np.abs(distances - usual))
 
 
 def _away_from_place(markers: FloatArray, kept: BoolArray) -> FloatArray:
@@ -154,32 +156,10 @@ def _away_from_place(markers: FloatArray, kept: BoolArray) -> FloatArray:
         known = ~np.isnan(shape[:, 0])
         motion = align(shape[known], markers[:, known], kept[:, known].astype(np.float64))
         placed = motion.undo(markers)
-        shape = _median(placed.transpose(1, 2, 0))
+        shape = median(placed.transpose(1, 2, 0))
     return np.asarray(np.linalg.norm(placed - shape, axis=2))
 
 
 def _strange(change: FloatArray, size: float) -> BoolArray:
     """Changes of frames (n, M) that are large and rare."""
-    return np.asarray(change > np.maximum(STRANGE * size, RARE * _median(change.T)))
-
-
-def _whole_runs(runs: BoolArray, chosen: BoolArray) -> BoolArray:
-    """The runs in time of True, (T, M), of which an entry is chosen."""
-    began = runs.copy()
-    began[1:] &= ~runs[:-1]
-    number = np.cumsum(began.T.ravel()).reshape(runs.T.shape).T  # of each run, from 1
-    return np.asarray(runs & np.isin(number, number[runs & chosen]))
-
-
-def _median(values: FloatArray) -> FloatArray:
-    """The median over the last axis of what is not NaN; NaN where nothing is."""
-    return _quantile(values, 0.5)
-
-
-def _quantile(values: FloatArray, share: float) -> FloatArray:
-    """The quantile over the last axis of what is not NaN; NaN where nothing is."""
-    ordered = np.sort(values, axis=-1)  # NaN comes last
-    last = np.maximum((~np.isnan(values)).sum(axis=-1)[..., None] - 1, 0)
-    low, high = np.floor(share * last), np.ceil(share * last)
-    ends = [np.take_along_axis(ordered, end.astype(np.int64), axis=-1) for end in (low, high)]
-    return np.asarray((ends[0] + ends[1])[..., 0] / 2.0)
+    return np.asarray(change > np.maximum(STRANGE * size, RARE * median(change.T)))

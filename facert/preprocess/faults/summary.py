@@ -40,7 +40,8 @@ def _blank_lines(mask: BoolArray, values: FloatArray) -> Iterator[str]:
     """A line for the frames in which all weights are the same."""
     rows = np.flatnonzero(mask.any(axis=1))
     if len(rows):
-        yield f"all weights {_when(rows)} are {np.nanmax(values[rows[0]]):g} at once: no face there"
+        value = np.nanmax(values[rows[0]])
+        yield f"all weights {_when(rows)} are {value:g}, coming and going with a jump (no face)"
 
 
 def _when(rows: IntArray) -> str:
