@@ -76,7 +76,7 @@ _BESIDE = _set(
     "sensor recv received receive send sent server client arrival relative rel absolute abs since "
     "start code of in the per arkit mediapipe raw data app hw cpu gpu user person subject actor "
     "tracker total process processing inference wall media hardware software recording "
-    "at on overall mean average day"
+    "at on sub overall mean average day"
 )
 # A name that ends so is no shape's, whatever stands in front.
 _LAST = _set("confidence conf timestamp timecode probability")
@@ -104,7 +104,7 @@ _STEMS = _set(
     "right corner wrinkle depress tighten compress suck bite swallow throat"
 )
 _FACE_STEMS = tuple(sorted(_STEMS))
-_FACE_WORDS = _set("head up down au aa ih ou ee oh a e o u ear ears rot vis")
+_FACE_WORDS = _set("head up down au aa ih ou ee oh ear ears rot vis")
 _ACTION_UNIT = re.compile(r"au\d+.*", re.IGNORECASE)
 
 

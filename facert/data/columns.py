@@ -30,6 +30,9 @@ _LINEAR = 1e-2  # of the range, by which a clock strays from a line
 _FEW = 4  # rows that copy the frames' numbers exactly
 _TWO_VALUED = 2  # more columns of two values than this are weights: lips of a puppet, visemes
 _LISTED = 12
+# Seconds, frames at the usual rates and smaller units, a second or a frame.
+_RATES = np.array((24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0))
+_SLOPES = np.concatenate([10.0 ** np.arange(-9, 10, 3), _RATES, 1 / _RATES, 1e3 / _RATES])
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ def weight_columns(
         Columns that are those of markers.
     sparse : bool
         The rows are single frames, of whose poses many have two values or rise steadily.
+
+    Raises `InputError` when no column is a weight.
     """
     kept = {*coordinates, *(column for pattern in keep for column in fitting(pattern, names))}
     roles = {
@@ -72,8 +77,9 @@ def weight_columns(
         for column, role in roles_of(names, values, time, sparse).items()
         if column not in kept
     }
-    if len(roles) == len(names):  # A table of nothing else: somebody's controls are named so
-        roles = {}
+    if names and len(roles) == len(names):
+        found, fix = ", ".join(names), "Add weights; facert convert --keep NAME keeps a column."
+        raise InputError("columns", "a weight at least", found, fix)
     _log_left_out(names, roles)
     absent = _absent(names, values, roles)
     left = [column for column in range(len(names)) if column not in roles]
@@ -92,7 +98,7 @@ def roles_of(
     }
     nameless = [c for c, name in enumerate(names) if c not in roles and not names_face(name)]
     if sparse:
-        copies = (c for c in nameless if _copies(values[:, c], time, _FEW, _WEIGHTS))
+        copies = (c for c in nameless if _restates(values[:, c], time))
         return roles | dict.fromkeys(copies, Role.CLOCK)
     shaped = {column: _role_of_shape(values[:, column], time) for column in nameless}
     flags = [c for c in nameless if len(names[c]) > 1 and _is_two_valued(values[:, c])]
@@ -181,7 +187,7 @@ def _rows_without(column: FloatArray, role: Role) -> BoolArray:
 def learnable(take: Take, keep: Sequence[str] = ()) -> Take:
     """A foreign take with its weights alone: see `weight_columns`. One of markers is as it was.
 
-    Raises `InputError` when a name to keep is not there.
+    Raises `InputError` when no weight remains.
     """
     source = take.source
     if source.kind == "markers":
@@ -223,7 +229,15 @@ def warn_of_clocks(take: Take) -> None:
         log.warning("learned from, though by name or shape no weights: %s", listed)
 
 
-def _copies(column: FloatArray, time: FloatArray, rows: int = ENOUGH, span: float = 0.0) -> bool:
-    """Whether so many rows of a column are a ramp that copies time exactly, beyond a span."""
+def _copies(column: FloatArray, time: FloatArray, rows: int = ENOUGH) -> bool:
+    """Whether so many rows of a column are a ramp that copies time exactly, whatever its range."""
     whole = len(column) >= rows and bool(np.isfinite(column).all())
-    return whole and bool(np.ptp(column) > span) and _is_line(column, time, most=1e-6)
+    return whole and bool(np.ptp(column) > 0) and _is_line(column, time, most=1e-6)
+
+
+def _restates(column: FloatArray, time: FloatArray) -> bool:
+    """Whether a column of a few rows is their time or frame in another unit or at a usual rate."""
+    if not _copies(column, time, _FEW) or np.ptp(column) <= _WEIGHTS:
+        return False
+    slope = (column[-1] - column[0]) / (time[-1] - time[0])
+    return bool((np.abs(slope / _SLOPES - 1) < 1e-4).any())

@@ -12,7 +12,14 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.clock import put_together
-from facert.data.column_names import Role, is_letter, names_face, role_of_name, unit_of_name
+from facert.data.column_names import (
+    Role,
+    is_letter,
+    name_words,
+    names_face,
+    role_of_name,
+    unit_of_name,
+)
 from facert.data.columns import rises
 from facert.data.rate import nominal_rate
 from facert.data.timecode import TICKS
@@ -65,13 +72,8 @@ def clock_of(table: Table, fps: float | None = None, sparse: bool = False) -> Cl
 
     Raises `InputError` naming the column, and the line of a cell that is no time.
     """
-    candidates = _candidates(table)
-    usable = (one for one in candidates if _is_usable(table, one, fps))
-    column = next(usable, None)
-    if column is None and fps is None:
-        column = _by_shape(table) if not sparse else None
-    if column is None and candidates and (fps is None or not _counts_frames(table, candidates[0])):
-        column = None if is_letter(table.names[candidates[0]]) else candidates[0]
+    fps = _rate_column(table) if fps is None else fps
+    column = _clock_column(table, fps, sparse)
     if column is None:
         return _even(table, fps)
     if column in table.texts:
@@ -80,6 +82,38 @@ def clock_of(table: Table, fps: float | None = None, sparse: bool = False) -> Cl
     if _counts_frames(table, column):
         return _frame_clock(table, column, fps)
     return _number_clock(table, column, sparse)
+
+
+def _clock_column(table: Table, fps: float | None, sparse: bool) -> int | None:
+    """The column to take: by name the first that rises, else by shape, else one that is amiss."""
+    candidates = _candidates(table)
+    for column in candidates:
+        if _is_usable(table, column, fps):
+            return column
+    shaped = _by_shape(table) if fps is None and not sparse else None
+    if shaped is not None:
+        return shaped
+    amiss = (c for c in candidates if fps is None or not _is_idle(table, c))
+    return next((c for c in amiss if not is_letter(table.names[c])), None)
+
+
+def _is_idle(table: Table, column: int) -> bool:
+    """Whether a column shows no time at all, so that a rate is enough."""
+    values = table.numbers[:, column]
+    still = column not in table.texts and bool((values == values[0]).all())
+    return still or _counts_frames(table, column)
+
+
+def _rate_column(table: Table) -> float | None:
+    """The rate that a column states in every row."""
+    for column, name in enumerate(table.names):
+        values = table.numbers[:, column]
+        if name_words(name) in (("fps",), ("framerate",), ("frame", "rate")):
+            same = bool((values == values[0]).all())
+            if same and 0 < values[0] <= _FASTEST:
+                log.info("%r states %g frames a second; --in-fps overrules it", name, values[0])
+                return float(values[0])
+    return None
 
 
 def _candidates(table: Table) -> list[int]:
@@ -102,12 +136,18 @@ def _counts_frames(table: Table, column: int) -> bool:
 def _is_usable(table: Table, column: int, fps: float | None) -> bool:
     """Whether a column rises, mostly, as a clock does; frame numbers need a rate."""
     if column in table.texts:
-        return all(map(is_time, table.texts[column]))
+        texts = table.texts[column]
+        codes = bool(codes_of_texts(texts))
+        return codes or (all(map(is_time, texts)) and _mostly_rises(seconds_of_texts(texts)))
     if _counts_frames(table, column) and fps is None:
         return False
     values = table.numbers[:, column]
     if is_letter(table.names[column]):
         return rises(values)
+    return _mostly_rises(values)
+
+
+def _mostly_rises(values: FloatArray) -> bool:
     up = np.diff(values) > 0
     return bool(np.isfinite(values).all() and (not len(up) or up.mean() > 0.5))
 

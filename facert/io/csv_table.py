@@ -15,6 +15,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.coordinates import markers_among
 from facert.io.guarded import read_text
-from facert.io.lines import check_width, parse_csv, read_header, to_numbers
+from facert.io.lines import Line, check_width, parse_csv, read_header, to_numbers
 from facert.io.livelink import is_livelink, read_livelink
+from facert.io.marker_header import marker_header
 from facert.io.table import Table, table_of_lines
 from facert.io.table_take import Reading, take_of_table, unlogged
 
@@ -68,6 +70,11 @@ def read_table(
         if _is_marked(text):
             return _read_marked(text)
         header, rows = parse_csv(text)
+        above = marker_header([Line(1, list(header)), *rows])
+        if above is not None:
+            table = table_of_lines(above.names, above.body)
+            take = take_of_table(table, Reading(above.rate or fps, tuple(keep), sparse))
+            return replace(take, units=above.unit)
         _require_names(header)
         return take_of_table(table_of_lines(header, rows), Reading(fps, tuple(keep), sparse))
 

@@ -16,6 +16,7 @@ from facert.errors import InputError
 from facert.io.guarded import existing_file, read_text
 
 MAX_HEADER = 2**20
+_PREAMBLE = 20  # lines before the header, at most
 SEPARATORS = ",;\t"
 
 # Quoted cells, in which separators do not count.
@@ -49,15 +50,38 @@ def read_lines(path: Path, separator: str) -> list[Line]:
 
 
 def read_header(path: Path) -> tuple[str, ...]:
-    """The cells of the first line, which shows the kind of a CSV file."""
+    """The cells of the first line with names, which shows the kind of a CSV file."""
     with existing_file(path).open(encoding="utf-8-sig", errors="replace") as file:
-        line = file.readline(MAX_HEADER)
+        lines = [file.readline(MAX_HEADER).rstrip("\r\n") for _ in range(_PREAMBLE + 1)]
+    line = next(filter(str.strip, _without_preamble(lines)), "")
     separator = separator_of(line)
     try:
-        cells = next(csv.reader([line.rstrip("\r\n")], delimiter=separator), [])
+        cells = next(csv.reader([line], delimiter=separator), [])
     except csv.Error:  # whoever reads the rows says where
         cells = line.split(separator)
     return tuple(cell.strip() for cell in cells)
+
+
+def _without_preamble(lines: Sequence[str]) -> list[str]:
+    """Lines with those before the header blank: Excel's ``sep=;``, and comments behind a #."""
+    bare, above = list(lines), lines[:_PREAMBLE]
+    names = next((line for line in above if line.strip() and not _is_comment(line)), "")
+    for number, line in enumerate(above):
+        before = line.lower().startswith("sep=") or (
+            _is_comment(line) and _cells(line) < _cells(names)
+        )
+        if line.strip() and not before:
+            break
+        bare[number] = ""
+    return bare
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith("#")
+
+
+def _cells(line: str) -> int:
+    return line.count(separator_of(line)) + 1
 
 
 def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
@@ -86,7 +110,7 @@ def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Lin
     InputError
         When there is no header, or no row.
     """
-    lines = text.splitlines()
+    lines = _without_preamble(text.splitlines())
     stripped = not separator
     separator = separator or separator_of(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)

@@ -29,6 +29,7 @@ log = logging.getLogger("facert")
 
 MAX_FRAMES = 2**31
 
+_TABLES = (".csv", ".tsv", ".tab")
 _FRAME = "frame"
 _FRAMES = 5.0  # rows a second of a table, which are frames and not poses now and then
 
@@ -44,7 +45,7 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
     """
     path = Path(path)
     with reading(path):
-        if path.suffix.lower() == ".csv" and not is_livelink(header := read_header(path)):
+        if path.suffix.lower() in _TABLES and not is_livelink(header := read_header(path)):
             poses = _read_table(path, header, fps, keep)
         else:
             take = _at_rate(read_any(path, kind="take", or_fps=fps, keep=keep), path, fps)
@@ -69,7 +70,7 @@ def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
     take = require_take(found, path)
     if fps is None or abs(take.fps - standard_rate(fps)) <= 1e-6 * fps:
         return take
-    table = path.suffix.lower() == ".csv" and not is_livelink(read_header(path))
+    table = path.suffix.lower() in _TABLES and not is_livelink(read_header(path))
     if frames_shown(take.time) is None or (table and take.fps < _FRAMES):
         log.info("%s: the times of its poses stay: --in-fps counts frames", path.name)
         return take

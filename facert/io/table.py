@@ -12,9 +12,12 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
 from facert.io.lines import Line, check_width, to_numbers
 
-_TRUTHS = {"true": "1", "false": "0", "yes": "1", "no": "0", "": "nan"}
-# No number, whatever the language: it has a letter, or parts a time of day.
-_TEXT = re.compile(r".*([^\W\d_]|:).*", re.DOTALL)
+_TRUTHS = {
+    **{"true": "1", "false": "0", "yes": "1", "no": "0", "": "nan"},
+    **dict.fromkeys(("na", "n/a", "#n/a", "null", "none"), "nan"),
+}
+# No number, whatever the language: it has a letter, or the parts of a time of day or a date.
+_TEXT = re.compile(r".*([^\W\d_]|:).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:
     """The table of the lines of a text file.
 
     A column is text when every cell of it that is not blank is; yes and no, true and false are 1
-    and 0.
+    and 0, and NA, null and none are blank.
 
     Raises `InputError` naming the line and the column of the first cell that is no number among
     numbers.

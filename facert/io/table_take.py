@@ -7,15 +7,17 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from facert.data.affixes import without_affix
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.clock import rising
 from facert.data.column_names import Role, role_of_name
 from facert.data.columns import Weights, require_there, weight_columns
 from facert.data.names import ARKIT_NAMES, canonical, fitting
+from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError
@@ -28,6 +30,7 @@ log = logging.getLogger("facert")
 _UNIT = re.compile(r"AU\d\d_r")
 _FEWEST_UNITS = 3
 _FEWEST_SHAPES = 10
+_FEW = 0.1  # of the rows, which a clock may repeat
 _LISTED = 6
 
 
@@ -54,6 +57,7 @@ def take_of_table(table: Table, how: Reading) -> Take:
     clock = clock_of(table, how.fps, how.sparse)
     if how.sparse and clock.origin:
         raise _of_another_clock(table, clock)
+    table, clock = _without_repeats(table, clock)
     columns = _columns(table, clock.column, how.keep)
     names, values = [table.names[column] for column in columns], table.numbers[:, columns]
     markers = None if how.sparse else _markers(names, values, how.keep)
@@ -186,6 +190,15 @@ def _one_subject(table: Table) -> Table:
     text = "%s of %s: %s of number %g are read"
     log.warning(text, plural(len(count), "face"), table.names[column], plural(rows, "row"), chosen)
     return table.rows(np.flatnonzero(values == chosen))
+
+
+def _without_repeats(table: Table, clock: Clock) -> tuple[Table, Clock]:
+    """The table without the few rows whose time does not rise, which the log has."""
+    late = np.diff(clock.time) <= 0
+    if not late.any() or late.sum() > _FEW * len(table):
+        return table, clock
+    kept, time = rising(clock.time, table.numbers)
+    return table.rows(kept), replace(clock, time=time, rate=nominal_rate(time))
 
 
 def _first_clock(table: Table) -> FloatArray | None:

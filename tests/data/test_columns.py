@@ -141,8 +141,10 @@ def test_a_tracker_s_number_of_a_face_hides_no_row():
     assert not weight_columns(["tracking_id", "a1", "b1", "c1"], values, TIME).absent.any()
 
 
-def test_controls_that_are_all_named_so_are_controls():
-    assert len(weight_columns(["frame", "time"], WEIGHTS[:, :2], TIME).columns) == 2
+def test_a_table_without_weights_is_refused():
+    with pytest.raises(InputError, match="--keep"):
+        weight_columns(["frame", "confidence"], WEIGHTS[:, :2], TIME)
+    assert len(weight_columns(["frame", "confidence"], WEIGHTS[:, :2], TIME, ["*"]).columns) == 2
 
 
 def test_few_poses_have_many_shapes_and_copies_of_their_clock_are_found():

@@ -281,11 +281,10 @@ def test_poses_have_no_control_that_is_a_confidence_or_a_clock(path, clock, capl
 
 
 def test_times_of_poses_are_seconds_however_far_apart(path):
-    write(
-        path, {"time": [10, 20, 30, 40, 50, 60], "a.x": range(6), "a.y": range(6), "a.z": [5] * 6}
-    )
+    times = [10, 20, 30, 40, 50, 60]
+    write(path, {"time": times, "a.x": range(6), "a.y": range(0, 120, 20), "a.z": [5] * 6})
     poses = read_poses(path)
-    np.testing.assert_array_equal(poses.time, [10, 20, 30, 40, 50, 60])
+    np.testing.assert_array_equal(poses.time, times)
     assert len(poses.names) == 3
 
 
@@ -304,3 +303,101 @@ def test_a_table_without_names_is_refused_plainly(path):
     path.write_text("0.1,0.2,0.35\n0.1,0.2,0.3\n")
     with pytest.raises(InputError, match="names of the columns"):
         read_take_file(path, fps=30)
+
+
+def rows_of(positions, front):
+    """Lines of trajectories (T, M, 3) behind cells in front."""
+    cells = zip(front, positions.reshape(len(positions), -1).round(4), strict=True)
+    return [",".join([*map(str, first), *map(str, row)]) for first, row in cells]
+
+
+POSITIONS = 50 * rng.normal(size=(FRAMES, 3, 3))
+
+
+def test_trajectories_of_vicon(path):
+    body = rows_of(POSITIONS, [(i + 40, 0) for i in range(FRAMES)])
+    header = [
+        "Trajectories", "120", ",,Ada:chin,,,Ada:lip_L,,,Ada:brow,,,",
+        "Frame,Sub Frame" + ",X,Y,Z" * 3, ",," + ",".join(["mm"] * 9),
+    ]  # fmt: skip
+    path.write_text("\n".join([*header, *body[:4], "44,0,,,,1,2,3,4,5,6", *body[5:]]))
+    take = read_take_file(path)
+    assert take.source.names == ("Ada:chin", "Ada:lip_L", "Ada:brow")
+    assert (take.fps, take.units) == (120, "mm")
+    assert np.flatnonzero(~take.source.valid.all(axis=1)).tolist() == [4]
+    np.testing.assert_array_equal(take.source.values[5:], POSITIONS[5:].round(4))
+
+
+def test_trajectories_of_motive(path):
+    names = [name for name in ("chin", "lip", "brow") for _ in range(3)]
+    header = [
+        "Format Version,1.23,Capture Frame Rate,120.000000,Length Units,Centimeters", "",
+        ",Type" + ",Marker" * 9, ",Name," + ",".join(f"Face:{name}" for name in names),
+        ",ID" + ",1:1" * 3 + ",1:2" * 3 + ",1:3" * 3, ",Parent" + "," * 9, "," + ",Position" * 9,
+        "Frame,Time (Seconds)" + ",X,Y,Z" * 3,
+    ]  # fmt: skip
+    front = [(i, round(i / 120, 6)) for i in range(FRAMES)]
+    path.write_text("\n".join([*header, *rows_of(POSITIONS, front)]))
+    take = read_take_file(path)
+    assert take.source.names == ("Face:chin", "Face:lip", "Face:brow")
+    assert (take.fps, take.units) == (120, "cm")
+
+
+@pytest.mark.parametrize("before", ["# made by a tracker, 2.1\n#\n", "sep=;\n", "\n\n"])
+def test_lines_before_the_header_are_passed_over(path, before):
+    write(path, {"frame": range(FRAMES), **weights()}, ";")
+    path.write_text(before + path.read_text())
+    assert read_take_file(path, fps=30).source.names == tuple(NAMES)
+    assert read_poses(path).frames is not None
+
+
+def test_a_column_may_state_the_rate(path, caplog):
+    write(path, {"frame": range(FRAMES), "fps": [25] * FRAMES, **weights()})
+    assert read_take_file(path).fps == 25
+    assert "'fps' states 25" in caplog.text
+
+
+def test_a_clock_that_stands_still_is_none(path):
+    write(path, {"timestamp": [0] * FRAMES, "frame": range(FRAMES), **weights()})
+    assert read_take_file(path, fps=25).fps == 25
+    write(path, {"timestamp": [0] * FRAMES, **weights()})
+    assert read_take_file(path, fps=25).fps == 25
+    with pytest.raises(InputError, match="/time"):
+        read_take_file(path)
+
+
+def test_a_time_that_is_there_twice_costs_its_row(path, caplog):
+    write(path, {"time": [*SECONDS[:9], *SECONDS[8:-1]], **weights()})
+    assert len(read_take_file(path)) == FRAMES - 1
+    assert "dropped 1 row" in caplog.text
+
+
+@pytest.mark.parametrize("blank", ["NA", "null", "NaN", "", "None"])
+def test_cells_without_a_value_are_blank(path, blank):
+    write(path, {"time": SECONDS, "jawOpen": [blank, *WEIGHTS[1:, 0]], "smile": WEIGHTS[:, 1]})
+    assert np.isnan(read_take_file(path).source.values[0, 0])
+
+
+def test_a_date_beside_the_time_is_text(path):
+    write(path, {"date": ["2026-05-01"] * FRAMES, "time": OF_DAY, **weights()})
+    assert read_take_file(path).fps == 30
+
+
+def test_weights_of_an_archive_have_no_clock_among_them(tmp_path, caplog):
+    path = tmp_path / "take.npz"
+    values = np.column_stack([1000 * SECONDS, WEIGHTS])
+    np.savez(path, weights=values, weight_names=["timestamp_ms", *NAMES], fps=30)
+    assert read_take_file(path).source.names == tuple(NAMES)
+    assert read_take_file(path, keep=["timestamp_ms"]).source.values.shape == (FRAMES, 4)
+
+
+def test_live_link_s_table_with_more_columns_has_its_weights_alone(path):
+    codes = [f"00:00:01:{2 * i:02d}.000" for i in range(FRAMES)]
+    values = rng.uniform(0.01, 1, size=(FRAMES, 52))
+    write(path, {"Timecode": codes, "BlendShapeCount": [52] * FRAMES,
+                 **dict(zip(ARKIT_SHAPES, values.T, strict=True)), "Timestamp": 1.7e9 + SECONDS,
+                 "TrackingConfidence": [0.9] * FRAMES})  # fmt: skip
+    assert read_take_file(path).source.names == ARKIT_SHAPES
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(f"{i or ''},{line}" for i, line in enumerate(lines)))
+    assert read_take_file(path).source.names == ARKIT_SHAPES
