@@ -68,7 +68,7 @@ class OscDecoder(Decoder):
     def __init__(self, names: Sequence[str], kind: SourceKind, units: str = "") -> None:
         self.pattern = frame_pattern(names, kind, units)
         self._numbers = 3 if kind == "markers" else 1
-        self._reported = self._ended = False
+        self._reported = self._ended = self._broken = False
         self._endless = 0
         self.forget()
 
@@ -86,26 +86,41 @@ class OscDecoder(Decoder):
         if found is None:
             messages = parse(packet)
             numbers = np.array([number for one in messages for number in one.numbers], np.float64)
-            if not np.isfinite(numbers).all():
-                raise BadPacketError("NaN or infinity")
+            finite = self._checked(numbers)
             uses = self._uses(messages)
             self._templates.remember(packet, messages, uses)
         else:
             uses, numbers = found
-            if not np.isfinite(numbers).all():
-                raise BadPacketError("NaN or infinity")
+            finite = self._checked(numbers)
         observed = None
         for use in uses:
-            observed = self._fill(use, numbers) or observed
+            observed = self._fill(use, numbers, finite) or observed
         return observed
+
+    def _checked(self, numbers: FloatArray) -> bool:
+        """Whether all numbers of a packet are finite; refuse a packet of which none is."""
+        finite = np.isfinite(numbers)
+        if finite.all():
+            return True
+        if not finite.any():
+            raise BadPacketError("NaN or infinity")
+        if not self._broken:
+            log.warning("NaN or infinity came for a value: it stays as it was")
+        self._broken = True
+        return False
 
     def rehearse(self, packet: bytes) -> None:
         """See `facert.live.frames.Decoder`; nothing is filled in."""
         self._templates.find(packet)
 
-    def _fill(self, use: _Use, numbers: FloatArray) -> Observed | None:
+    def _fill(self, use: _Use, numbers: FloatArray, finite: bool) -> Observed | None:
         """The frame that a datagram's numbers complete, if they do."""
-        self._held.reshape(-1)[use.cells] = numbers[use.numbers]
+        cells, values = use.cells, numbers[use.numbers]
+        if not finite:  # a marker counts as a whole
+            good = np.isfinite(values.reshape(-1, self._numbers)).all(axis=1)
+            kept = np.repeat(good, self._numbers)
+            cells, values = cells[kept], values[kept]
+        self._held.reshape(-1)[cells] = values
         if use.clock is not None:
             self._stamp = _first(numbers[use.clock])
         if use.end is None:
@@ -174,7 +189,7 @@ class OscDecoder(Decoder):
 
 
 def _first(numbers: FloatArray) -> float | None:
-    return float(numbers[0]) if len(numbers) else None
+    return float(numbers[0]) if len(numbers) and np.isfinite(numbers[0]) else None
 
 
 class VmcEncoder:

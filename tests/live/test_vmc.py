@@ -335,3 +335,21 @@ def test_a_few_names_that_come_twice_are_those_that_came_first(caplog):
     observed = feed(weights(MANY), *sent, message("/debug/jawOpen", 9.0), APPLY)
     np.testing.assert_array_equal(observed.values, np.arange(4) / 4)
     assert "/face/jawOpen and /debug/jawOpen are one name: the first counts" in caplog.text
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_a_number_that_is_none_spoils_no_other_value_of_its_packet(wrong, caplog):
+    decoder = weights(MANY)
+    for turn, value in enumerate([0.5, wrong, wrong, 0.75]):
+        sent = values(MANY[1:], float(turn))
+        observed = decoder.decode(
+            bundle(LONG, message("/x/jawOpen", value), *sent, message("/x/frame", wrong))
+        )
+        expected = 0.75 if turn == 3 else 0.5
+        np.testing.assert_array_equal(observed.values, [expected, *(np.arange(3) / 4 + turn)])
+        assert observed.stamp is None
+    assert caplog.text.count("NaN or infinity") == 1
+    markers = OscDecoder(("chin", "nose"), "markers")
+    bad = [message("/m/chin", 1.0, wrong, 2.0), message("/m/nose", 1.0, 2.0, 3.0)]
+    observed = markers.decode(bundle(*bad, message("/m/frame")))
+    np.testing.assert_array_equal(observed.values, [[math.nan] * 3, [1.0, 2.0, 3.0]])
