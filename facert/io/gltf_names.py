@@ -16,7 +16,6 @@ from typing import Any
 from facert.data.text import printable
 from facert.errors import InputError
 from facert.io.gltf import Document
-from facert.io.gltf_scene import Scene
 from facert.io.vrm import names_of_single_targets
 
 log = logging.getLogger("facert")
@@ -27,16 +26,15 @@ _REST = ("basis", "base", "neutral", "rest")
 _NUMBERED = re.compile(r"(buffer|accessor|attribute|position|target|morph|shape|mesh|prim)", re.I)
 
 
-def target_names(scene: Scene) -> dict[int, tuple[str, ...]]:
-    """The names of the morph targets of each mesh of the scene that has some, by its number.
+def target_names(document: Document) -> dict[int, tuple[str, ...]]:
+    """The names of the morph targets of each mesh that a node shows, by its number.
 
     All names of one mesh differ. Where several meshes have targets without names, their numbers
     come with the mesh, so that nobody takes them for the same.
 
     Raises `InputError` when there are names, and not as many as targets.
     """
-    document, nodes = scene.document, scene.document.root["nodes"]
-    placed = dict.fromkeys(nodes[node]["mesh"] for node in scene.nodes if "mesh" in nodes[node])
+    placed = dict.fromkeys(node["mesh"] for node in document.root["nodes"] if "mesh" in node)
     counts = {mesh: _count(document.root["meshes"][mesh]) for mesh in placed}
     counts = {mesh: count for mesh, count in counts.items() if count}
     stated = {mesh: _stated(document, mesh, count) for mesh, count in counts.items()}

@@ -71,7 +71,7 @@ def read_gltf_rig(path: Path, shapes: str | None = None) -> Rig:
             raise InputError(
                 "meshes", "morph targets", "none", "Export the mesh with its shape keys."
             )
-        names = target_names(scene)
+        names = target_names(document)
         parts = [_part(scene, one, names[one.mesh]) for one in there]
         _log_default_weights(document, there, names)
         expressions = _expressions(document, shapes)
@@ -93,7 +93,7 @@ def read_gltf_mesh(path: Path) -> Mesh:
         chosen = [one for one in there if one.targets] or there
         if not chosen:
             raise InputError("meshes", "triangles", "none", "Export the mesh as well.")
-        names = target_names(scene)
+        names = target_names(document)
         whole = _welded(_united([_part(scene, one, names.get(one.mesh, ())) for one in chosen]))
         return Mesh(whole.vertices, whole.faces, UNITS, whole.colours)
 

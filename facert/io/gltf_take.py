@@ -1,4 +1,4 @@
-"""Takes in glTF files: the animation of morph targets' weights."""
+"""Takes in glTF files: the animation of morph targets' weights, or of a VRM's expressions."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
 from facert.io.gltf_names import target_names
-from facert.io.gltf_scene import scene_of
 from facert.io.registry import Kind
+from facert.io.vrm import animated_expressions
 
 log = logging.getLogger("facert")
 
+_WEIGHTS = "weights"
 _FASTEST = 240.0  # frames a second
 _CLOSE = 0.05  # the share of the steps between keys that are as close as frames, at least
 _SAME = 1e-6  # seconds: keys are stored as float32
@@ -60,19 +61,26 @@ def kind_of(path: Path, asked: Kind | None = None) -> Kind:
     """Kind to read: the one asked for, else the rig, with a line in the log on its animation."""
     if asked is None:
         with open_gltf(path) as document:
-            animated = any(_channels(one) for one in document.root.get("animations", []))
+            animated = any(_channels(document, one) for one in document.root.get("animations", []))
         if animated:
             log.info("%s: this is the rig; its animation is a take as well", path.name)
     return asked or "rig"
 
 
-def _channels(animation: dict[str, Any]) -> list[dict[str, Any]]:
-    return [one for one in animation["channels"] if one["target"]["path"] == "weights"]
+def _channels(document: Document, animation: dict[str, Any]) -> list[dict[str, Any]]:
+    """The channels of morph targets' weights, and of the nodes that stand for expressions."""
+    nodes = animated_expressions(document.root)
+    return [
+        one
+        for one in animation["channels"]
+        if one["target"]["path"] == _WEIGHTS
+        or (one["target"]["path"] == "translation" and one["target"].get("node") in nodes)
+    ]
 
 
 def _chosen(document: Document, asked: str | None) -> list[_Curves]:
     """The curves of the animation that was asked for, or of the only one."""
-    found = [one for one in document.root.get("animations", []) if _channels(one)]
+    found = [one for one in document.root.get("animations", []) if _channels(document, one)]
     names = [str(one.get("name", f"animation {i}")) for i, one in enumerate(found, start=1)]
     there = f"one of: {', '.join(names)}" if names else "an animation of morph targets"
     if asked is not None and asked not in names:
@@ -81,8 +89,18 @@ def _chosen(document: Document, asked: str | None) -> list[_Curves]:
         wanted = "Choose with --target." if found else "Export the animation as well."
         raise InputError("animations", there, "none" if not found else "no choice", wanted)
     animation = found[names.index(asked)] if asked is not None else found[0]
-    known = target_names(scene_of(document))
-    return [_curves(document, animation, channel, known) for channel in _channels(animation)]
+    known = _names_by_node(document)
+    channels = _channels(document, animation)
+    return [_curves(document, animation, channel, known) for channel in channels]
+
+
+def _names_by_node(document: Document) -> dict[int, tuple[str, ...]]:
+    """The names of what an animation of each node moves: targets of its mesh, or an expression."""
+    of_meshes = target_names(document)
+    nodes = enumerate(document.root["nodes"])
+    known = {i: of_meshes[one["mesh"]] for i, one in nodes if one.get("mesh") in of_meshes}
+    expressions = animated_expressions(document.root)
+    return known | {node: (str(name),) for node, name in expressions.items()}
 
 
 def _curves(
@@ -91,14 +109,15 @@ def _curves(
     channel: dict[str, Any],
     known: dict[int, tuple[str, ...]],
 ) -> _Curves:
-    sampler = animation["samplers"][channel["sampler"]]
-    names = known[document.root["nodes"][channel["target"]["node"]]["mesh"]]
+    sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
+    names = known[target["node"]]
     count = len(names)
     time = document.numbers(sampler["input"])[:, 0]
     if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise ValueError("keys whose time does not rise")
     interpolation = sampler.get("interpolation", "LINEAR")
     values = document.numbers(sampler["output"])
+    values = values if target["path"] == _WEIGHTS else values[:, :1]  # of a translation the x
     shape = (len(time), 3, count) if interpolation == "CUBICSPLINE" else (len(time), count)
     return _Curves(time, values.reshape(shape), names, interpolation)
 

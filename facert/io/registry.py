@@ -127,6 +127,11 @@ FORMATS = (
         reads="the same of a VRM avatar; with `--shapes expressions` its expressions",
     ),
     Format(
+        (".vrma",),
+        {"take": "gltf_take.read_gltf_take"},
+        reads="a take of the expressions of a VRM animation",
+    ),
+    Format(
         (".glb",),
         write={"morphs": "glb.write_glb"},
         writes="by `convert`: a rig, a take with `--rig`, a mesh sequence",

@@ -3,7 +3,8 @@
 VRM 0 has them in ``extensions.VRM.blendShapeMaster.blendShapeGroups``, each with ``binds`` of a
 mesh, the index of a target, and a weight from 0 to 100. VRM 1 has them in
 ``extensions.VRMC_vrm.expressions``, presets and custom ones, each with ``morphTargetBinds`` of a
-node, an index, and a weight from 0 to 1. What they do to materials is left aside.
+node, an index, and a weight from 0 to 1. What they do to materials is left aside. A VRM animation
+moves a node for each expression: its x is the weight.
 """
 
 from __future__ import annotations
@@ -43,6 +44,14 @@ def names_of_single_targets(root: dict[str, Any], mesh: int) -> dict[int, str]:
     """Names of a mesh's targets, by index, that are each the whole of an expression."""
     single = {name: b[0] for name, b in expressions_of(root).items() if len(b) == 1}
     return {b.target: name for name, b in single.items() if b.mesh == mesh and b.weight == 1.0}
+
+
+def animated_expressions(root: dict[str, Any]) -> dict[int, str]:
+    """The expressions whose weights a VRM animation holds, by the nodes whose x these are."""
+    animation = root.get("extensions", {}).get("VRMC_vrm_animation", {})
+    kinds = animation.get("expressions", {})
+    found = {kind: kinds.get(kind) or {} for kind in ("preset", "custom")}
+    return {one["node"]: name for some in found.values() for name, one in some.items()}
 
 
 def _of_version_0(vrm: dict[str, Any]) -> Iterator[tuple[str, list[Bind]]]:

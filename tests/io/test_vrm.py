@@ -140,3 +140,30 @@ def test_an_animation_in_an_avatar_is_a_take(tmp_path: Path) -> None:
     builder.animate([0.0, 0.5], np.ones((2, 2)))
     path = builder.save(tmp_path / "face.glb").rename(tmp_path / "face.vrm")
     assert read_take_file(path).source.names == ("smile", "blink")
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "CUBICSPLINE"])
+def test_a_vrm_animation_is_a_take_of_expressions(tmp_path: Path, interpolation: str) -> None:
+    builder = Builder()
+    nodes = [builder.joint(), builder.joint(), builder.joint()]
+    for node, values in zip(nodes, ([0, 0.5, 1], [1, 1, 0], [9, 9, 9]), strict=True):
+        output = np.float32([[value, 7, 7] for value in values])
+        if interpolation == "CUBICSPLINE":
+            output = np.stack([0 * output, output, 0 * output], axis=1).reshape(-1, 3)
+        builder.animate([0.0, 0.1, 0.2], [0], interpolation, node)
+        channel = builder.document.animations.pop()
+        channel.channels[0].target.path = "translation"
+        channel.samplers[0].output = builder.accessor(output)
+        if not builder.document.animations:
+            builder.document.animations.append(channel)
+            continue
+        channel.channels[0].sampler = len(builder.document.animations[0].samplers)
+        builder.document.animations[0].samplers += channel.samplers
+        builder.document.animations[0].channels += channel.channels
+    expressions = {"preset": {"aa": {"node": 0}}, "custom": {"jawOpen": {"node": 1}}}
+    builder.document.extensions = {"VRMC_vrm_animation": {"expressions": expressions}}
+    builder.document.scenes[0].nodes = nodes
+    path = builder.save(tmp_path / "a.glb").rename(tmp_path / "a.vrma")
+    take = read_take_file(path)
+    assert take.source.names == ("aa", "jawOpen")
+    np.testing.assert_allclose(take.source.values, [[0, 1], [0.5, 1], [1, 0]])

@@ -59,7 +59,9 @@ TARGET = Annotated[
 ]
 SHAPES = Annotated[
     str | None,
-    file_option("Which of several sets of shapes of an .npz rig.", "--shapes", metavar="KEY"),
+    file_option(
+        "Which set of shapes of an .npz rig; expressions of a .vrm.", "--shapes", metavar="KEY"
+    ),
 ]
 RIG = Annotated[Path | None, file_option("The character's rig.", "--rig")]
 TRUTH = Annotated[Path | None, file_option("The true poses of the same frames.", "--truth")]
