@@ -32,6 +32,10 @@ def trials() -> list[Trial]:
     """Trials of tables, weights first."""
     return [
         *(_of_csv(about, **options) for about, options in _CSV.items()),
+        *(_of_json(orient, make) for orient, make in _JSON.items()),
+        Trial(
+            PROGRAM, "markers.csv", "markers, columns (LBROW, x) in two rows, `--in-fps`", _two_rows
+        ),
         Trial(PROGRAM, "markers_flat.csv", "markers, columns LBROW_X", _flat_markers),
     ]
 
@@ -111,6 +115,12 @@ _CSV: dict[str, dict[str, Any]] = {
     "Unix time": {"make": _unix, "index": False},
     "`frame`, `confidence`, `success`": {"make": _tracked, "index": False},
 }
+_JSON: dict[str, Callable[[], pd.DataFrame]] = {
+    "records": _timed,
+    "split": _timed,
+    "columns": _timed,
+    "index": _timed,
+}
 
 
 def _of_csv(
@@ -128,11 +138,28 @@ def _of_csv(
     return Trial(PROGRAM, "take.csv", f"weights and times, {about}", difference, tolerance)
 
 
+def _of_json(orient: Any, make: Callable[[], pd.DataFrame]) -> Trial:
+    def difference(folder: Path) -> float:
+        path = folder / "take.json"
+        make().to_json(path, orient=orient)
+        return weights_difference(read_take_file(path), TIME, WEIGHTS)
+
+    return Trial(PROGRAM, "take.json", f"weights and times, orient={orient}", difference, 1.1e-6)
+
+
 def _marker_table(columns: Any) -> pd.DataFrame:
     import pandas as pd
 
     index = pd.Index(TIME, name="time")
     return pd.DataFrame(POSITIONS.reshape(len(TIME), -1), index=index, columns=columns)
+
+
+def _two_rows(folder: Path) -> float:
+    import pandas as pd
+
+    columns = pd.MultiIndex.from_product([MARKERS, list("xyz")])
+    _marker_table(columns).reset_index(drop=True).to_csv(folder / "markers.csv")
+    return markers_difference(read_take_file(folder / "markers.csv", fps=FPS), POSITIONS, FPS)
 
 
 def _flat_markers(folder: Path) -> float:
