@@ -79,9 +79,10 @@ FORMATS = (
         read={"take": "csv_table.read_csv_take"},
         write={"take": "csv_table.write_table"},
         mixed="csv_table.is_mixed",
-        about=" of Live Link Face or plain",
-        reads="Live Link Face, or a table with a header: `time` or `frame`, `NAME.x NAME.y NAME.z` "
-        "or weights; separated by commas, or by semicolons or tabs with decimal commas as well",
+        about=" of Live Link Face, another tracker or plain",
+        reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y NAME.z` "
+        "or weights; of OpenFace, MediaPipe, Vicon and others; separated by commas, or by "
+        "semicolons or tabs with decimal commas as well",
         writes="poses (else the source) as a table; never both",
     ),
     Format(
