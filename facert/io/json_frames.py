@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from facert.data.column_names import role_of_name
+from facert.data.column_names import Role, role_of_name
 from facert.errors import InputError
 
 Number = int | float
@@ -21,7 +21,9 @@ Number = int | float
 _NAME_KEYS = ("categoryName", "category_name", "name", "label", "key", "shape", "blendShape",
               "blendshape", "displayName", "display_name")  # fmt: skip
 _SCORE_KEYS = ("score", "value", "weight", "coefficient", "amount")
+_AXES = ("x", "y", "z")
 _DEEPEST = 6
+_CLOCKS = (Role.CLOCK, Role.FRAME)
 
 
 @dataclass
@@ -60,17 +62,27 @@ def frames_of(document: Any) -> list[Frame]:
     Raises `InputError` when there are none, or a frame has more or fewer numbers than names.
     """
     names = _names(document)
-    found = _by_key(document) if isinstance(document, dict) else None
+    found = _by_key(document, names) if isinstance(document, dict) else None
     lists = [found] if found else list(_lists(document, names))
     if not lists:
         keys = ", ".join(list(document)[:6]) if isinstance(document, dict) else "no frames"
         expected = "frames of weights by name, or facsNames and weightMat"
         raise InputError("weightMat", expected, keys or "nothing", "Export it in such a layout.")
-    return [_frame(one, names) for one in max(lists, key=len)]
+    frames = max(lists, key=len)
+    return [_frame(one, names) for one in frames[_is_header(frames) :]]
+
+
+def _is_header(frames: Sequence[Any]) -> bool:
+    """Whether the first object of a list is about the others: none of its keys is in theirs."""
+    if len(frames) < 3 or not all(isinstance(one, dict) for one in frames[:3]):
+        return False
+    return not frames[0].keys() & frames[1].keys() and bool(frames[1].keys() & frames[2].keys())
 
 
 def rate_of(document: Any) -> float | None:
     """The frames a second that a document states beside its frames, if it does."""
+    if isinstance(document, list) and _is_header(document):
+        return rate_of(document[0])
     if not isinstance(document, dict):
         return None
     for key, value in document.items():
@@ -80,8 +92,16 @@ def rate_of(document: Any) -> float | None:
     return next((rate for rate in inner if rate is not None), None)
 
 
+def has_times(document: Mapping[str, Any]) -> bool:
+    """Whether an object states no rate, but times of its frames in a list."""
+    times = (role_of_name(key) in _CLOCKS and _is_column(value) for key, value in document.items())
+    return rate_of(document) is None and any(times)
+
+
 def _names(document: Any) -> tuple[str, ...]:
     """The longest list of texts outside of the frames: the names of their numbers."""
+    if isinstance(document, list) and _is_header(document):
+        document = document[0]
     lists: list[list[str]] = []
     _collect_names(document, lists, 0)
     longest: list[str] = max(lists, key=len, default=[])
@@ -111,16 +131,15 @@ def _lists(value: Any, names: Sequence[str], depth: int = 0) -> Iterator[list[An
 
 def _may_be_frame(value: Any, names: Sequence[str]) -> bool:
     if isinstance(value, list):
-        numbers = len(value) == len(names) and all(map(_is_number, value))
-        return not value or _pairs(value) is not None or (numbers and bool(names))
+        return not value or _pairs(value) is not None or _is_row(value, names)
     return isinstance(value, dict)
 
 
 # ---- frames of other layouts than a list
 
 
-def _by_key(document: Mapping[str, Any]) -> list[Any] | None:
-    """Frames of columns, of pandas' tables, or of an object with a key a frame."""
+def _by_key(document: Mapping[str, Any], names: Sequence[str]) -> list[Any] | None:
+    """Frames of columns, of pandas' tables, of a matrix with times, or with a key a frame."""
     if isinstance(document.get("columns"), list) and isinstance(document.get("data"), list):
         rows = document["data"]
         if all(isinstance(row, list) for row in rows):
@@ -134,7 +153,25 @@ def _by_key(document: Mapping[str, Any]) -> list[Any] | None:
             map(_is_numeral, objects[0])
         ):
             return [{key: document[key][row] for key in document} for row in objects[0]]
-    return _of_columns(document)
+    return _of_matrix(document, names) or _of_columns(document)
+
+
+def _of_matrix(document: Mapping[str, Any], names: Sequence[str]) -> list[Any] | None:
+    """Frames of rows of numbers, one a name, beside a list of their times."""
+    for rows in document.values():
+        if not (isinstance(rows, list) and rows and all(_is_row(row, names) for row in rows)):
+            continue
+        for key, times in document.items():
+            if role_of_name(key) in _CLOCKS and _is_column(times) and len(times) == len(rows):
+                return [{key: t, "weights": row} for t, row in zip(times, rows, strict=True)]
+    return None
+
+
+def _is_row(value: Any, names: Sequence[str]) -> bool:
+    """Whether a value has a number, or null, for each name."""
+    if not isinstance(value, list) or not names or len(value) != len(names):
+        return False
+    return all(one is None or _is_number(one) for one in value)
 
 
 def _of_columns(document: Mapping[str, Any]) -> list[Any] | None:
@@ -192,12 +229,27 @@ def _add_object(
 ) -> None:
     group: dict[str, Number] = {}
     for name, inner in value.items():
-        if depth and _is_number(inner) and role_of_name(name) is None:
-            group[name] = inner
-        else:
+        named = _numbers_of(name, inner) if depth else None
+        if named is None:
             _add(frame, name, inner, names, depth + 1)
+        else:
+            group |= named
     if depth and (group or not value):
         frame.groups.setdefault(key, {}).update(group)
+
+
+def _numbers_of(name: str, value: Any) -> dict[str, Number] | None:
+    """A weight, the score of one, or the coordinates of a marker in a group; None for another."""
+    if _is_number(value):
+        return {name: value} if role_of_name(name) is None else None
+    if isinstance(value, dict):
+        if value.keys() == set(_AXES) and all(map(_is_number, value.values())):
+            return {f"{name}.{axis}": value[axis] for axis in _AXES}
+        score = _score(value)
+        return None if score is None else {name: score}
+    if isinstance(value, list) and len(value) == len(_AXES) and all(map(_is_number, value)):
+        return {f"{name}.{axis}": one for axis, one in zip(_AXES, value, strict=True)}
+    return None
 
 
 def _add_list(
@@ -225,19 +277,31 @@ def _add_numbers(frame: Frame, key: str, value: Sequence[Any], names: Sequence[s
 
 
 def _pairs(value: Sequence[Any]) -> dict[str, Number] | None:
-    """Numbers by name of a list of objects that have both; None for another list."""
-    if not all(isinstance(one, dict) for one in value):
-        return None
+    """Numbers by name of a list in which each has both; None for another list."""
     pairs = {}
     for one in value:
-        name = next(
-            (one[key] for key in _NAME_KEYS if isinstance(one.get(key), str) and one[key]), None
-        )
-        score = next((one[key] for key in _SCORE_KEYS if _is_number(one.get(key))), None)
-        if name is None or score is None:
+        name, score = _pair(one)
+        if name is None or score is None or name in pairs:
             return None
         pairs[name] = score
     return pairs
+
+
+def _pair(value: Any) -> tuple[str | None, Number | None]:
+    """Name and number of an object with both, ``[name, number]`` or ``{name: number}``."""
+    if isinstance(value, list) and len(value) == 2:
+        value = {"name": value[0], "score": value[1]}
+    if not isinstance(value, dict):
+        return None, None
+    if len(value) == 1:
+        ((name, score),) = value.items()
+        return name, score if _is_number(score) else None
+    texts = (value[key] for key in _NAME_KEYS if isinstance(value.get(key), str))
+    return next(filter(None, texts), None), _score(value)
+
+
+def _score(value: Mapping[str, Any]) -> Number | None:
+    return next((value[key] for key in _SCORE_KEYS if _is_number(value.get(key))), None)
 
 
 def _is_number(value: Any) -> bool:

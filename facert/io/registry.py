@@ -80,8 +80,8 @@ FORMATS = (
         write={"take": "csv_table.write_table"},
         mixed="csv_table.is_mixed",
         about=" of Live Link Face, another tracker or plain",
-        reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y NAME.z` "
-        "or weights; of OpenFace, MediaPipe, Vicon and others; separated by commas, or by "
+        reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y "
+        "NAME.z` or weights; of OpenFace, MediaPipe, Vicon and others; separated by commas, or by "
         "semicolons or tabs with decimal commas as well",
         writes="poses (else the source) as a table; never both",
     ),

@@ -133,6 +133,9 @@ def _columns(table: Table, clock: int | None, keep: Sequence[str]) -> IntArray:
         if name or not blank[column]
     ]
     _log_texts(table, texts, numbers)
+    if not numbers:
+        fix = "Give the table of weights or markers itself."
+        raise InputError("columns", "numbers of weights or markers", "a clock alone", fix)
     others = _of_mediapipe(table.names, [c for c in numbers if c not in kept])
     kept_numbers = [column for column in numbers if column in kept]
     return np.array(sorted(_of_openface(table.names, others) + kept_numbers), dtype=np.int64)

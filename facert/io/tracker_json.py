@@ -20,7 +20,7 @@ from facert.data.take import Take
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
-from facert.io.json_frames import Frame, Number, frames_of, parsed, rate_of
+from facert.io.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
 from facert.io.table import Table
 from facert.io.table_take import Reading, listed, take_of_table
 
@@ -41,7 +41,7 @@ def read_json_take(path: Path, fps: float | None = None, keep: Sequence[str] = (
     """
     with reading(path):
         document = parsed(read_text(path))
-        if isinstance(document, dict) and holds_curves(document):
+        if isinstance(document, dict) and holds_curves(document) and not has_times(document):
             return take_of_curves(document, fps)
         table = _table(frames_of(document))
         return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep)))

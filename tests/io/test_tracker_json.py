@@ -65,6 +65,19 @@ LAYOUTS = {
     },
     "names once": {"fps": 30, "blendshapes": list(NAMES), "data": VALUES.tolist()},
     "columns": COLUMNS,
+    "a matrix with times": {
+        "names": list(NAMES),
+        "timestamps_ms": (1000 * SECONDS).tolist(),
+        "weights": VALUES.tolist(),
+    },
+    "pairs": [{"time": t, "blendshapes": [[n, v] for n, v in row.items()]} for t, row in STAMPS],
+    "an object a weight": [
+        {"time": t, "blendshapes": [{n: v} for n, v in row.items()]} for t, row in STAMPS
+    ],
+    "scores below names": [
+        {"time": t, "blendshapes": {n: {"value": v, "min": 0} for n, v in row.items()}}
+        for t, row in STAMPS
+    ],
     "columns under a key": {
         "timestamps": SECONDS.tolist(),
         "blendshapes": dict(zip(NAMES, VALUES.T.tolist(), strict=True)),
@@ -98,6 +111,10 @@ LAYOUTS = {
 }  # fmt: skip
 LINES = {
     "lines": [{"time": t, "blendshapes": row} for t, row in STAMPS],
+    "lines below one about them": [
+        {"fps": 30, "device": "phone"},
+        *({"blendshapes": row} for row in ROWS),
+    ],
     "flat lines": [{"frame_time": t, **row} for t, row in STAMPS],
 }
 
@@ -125,6 +142,19 @@ def test_frames_are_found_in_any_layout(path, layout):
 def test_frames_may_be_one_a_line(path, layout):
     path.write_text("\n".join(map(json.dumps, LINES[layout])) + "\n\n")
     check(read_take_file(path))
+
+
+@pytest.mark.parametrize("of", [list, lambda xyz: dict(zip("xyz", xyz, strict=True))])
+def test_markers_may_be_lists_or_objects(path, of):
+    chin = 50 + VALUES[:, :3]
+    frames = [
+        {"time": t, "markers": {"chin": of(xyz), "lip": of([1.0, 2.0, 3.0])}}
+        for t, xyz in zip(SECONDS.tolist(), chin.tolist(), strict=True)
+    ]
+    path.write_text(json.dumps(frames))
+    source = read_take_file(path).source
+    assert source.names == ("chin", "lip")
+    np.testing.assert_array_equal(source.values[:, 0], chin)
 
 
 def test_what_is_left_out_is_named(path, caplog):
