@@ -63,12 +63,50 @@ def _printable(text: str) -> str:
 
 
 class OutputExistsError(FacertError):
-    """The output file exists and ``--overwrite`` was not given."""
+    """The output file exists and ``--overwrite`` was not given.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    problem : str, optional
+        What is the matter with it.
+    fix : str, optional
+        What the user can do about it.
+    """
 
     exit_code = 2
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(f"{path}: the file exists. Give another name, or --overwrite.")
+    def __init__(
+        self,
+        path: Path,
+        problem: str = "the file exists",
+        fix: str = "Give another name, or --overwrite.",
+    ) -> None:
+        super().__init__(path, problem, fix)
+        self.path, self.problem, self.fix = path, problem, fix
+
+    def __str__(self) -> str:
+        """One line: ``path: problem. Fix.``."""
+        return _printable(f"{self.path}: {self.problem}. {self.fix}")
+
+
+class OutputKeptError(OutputExistsError):
+    """The output file exists and is never replaced, not even with ``--overwrite``.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    problem : str, optional
+        Why it is kept.
+    """
+
+    exit_code = 3
+
+    def __init__(self, path: Path, problem: str = "the file was not written by facert") -> None:
+        fix = "Give another name, or delete it yourself."
+        super().__init__(path, f"{problem}: it is never replaced", fix)
 
 
 class NumericalError(FacertError):

@@ -1,4 +1,5 @@
 """The release of facert, which the files that it writes name."""
 
 VERSION = "0.1.0"
-CREATED_BY = f"facert {VERSION}"
+MARK = "facert "
+CREATED_BY = f"{MARK}{VERSION}"

@@ -19,7 +19,7 @@ from facert.demo import acting, build
 from facert.demo.character import CONTROLS, animate, control_shapes
 from facert.demo.expressions import ACTIVATIONS, expressions
 from facert.demo.head import Head, make_head, marker_vertices
-from facert.errors import OutputExistsError
+from facert.io.registry import require_replaceable
 from facert.io.rig import write_rig
 from facert.io.take import write_take
 
@@ -78,8 +78,7 @@ def write_demo(folder: Path, seed: int = 0, overwrite: bool = False) -> tuple[Pa
     """
     paths = tuple(Path(folder) / name for name in FILES)
     for path in paths:
-        if path.exists() and not overwrite:
-            raise OutputExistsError(path)
+        require_replaceable(path, overwrite)
     training, performance, actor, character = paths
     write_take(training_take(seed), training, overwrite)
     write_take(performance_take(seed + 1), performance, overwrite)

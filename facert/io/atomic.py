@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from facert.errors import InputError, OutputExistsError
+from facert.errors import InputError
+from facert.io.registry import require_replaceable
 
 
 @contextmanager
@@ -20,7 +21,7 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     path : Path
         The output file. Missing parent folders are made.
     overwrite : bool
-        Allow to replace an existing file.
+        Allow to replace an existing file that facert wrote.
 
     Yields
     ------
@@ -31,13 +32,14 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     ------
     OutputExistsError
         When `path` exists and `overwrite` is not set; raised before anything is written.
+    OutputKeptError
+        When facert did not write the file that is there; see `require_replaceable`.
     InputError
         When the file cannot be written there. On this, as on any exception of the writer, no
         temporary file is left and an existing `path` is untouched.
     """
     path = Path(path)
-    if path.exists() and not overwrite:
-        raise OutputExistsError(path)
+    require_replaceable(path, overwrite)
     temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,9 @@ cell was not observed. Written are the poses of a take, or else its source.
 Where a table of facert's own would be read otherwise, as with a control called ``frame``, its first
 cell states what the columns are: ``time (weights)`` or ``time (markers)``. Names and times are then
 exactly those of the file.
+
+The first cell is quoted, though it need not be, and no other: programs read the table as any other,
+and by that facert knows it for its own, which may be replaced.
 """
 
 from __future__ import annotations
@@ -27,15 +30,26 @@ from facert.data.take import Source, Take, named_columns
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.coordinates import markers_among
-from facert.io.guarded import read_text
-from facert.io.lines import Line, check_width, parse_csv, read_header, to_numbers
+from facert.io.guarded import read_beginning, read_text
+from facert.io.lines import (
+    MAX_HEADER,
+    Line,
+    check_width,
+    parse_csv,
+    read_header,
+    to_numbers,
+)
 from facert.io.livelink import is_livelink, read_livelink
 from facert.io.marker_header import marker_header
 from facert.io.table import Table, table_of_lines
 from facert.io.table_take import Reading, take_of_table, unlogged
 
+CURVE = "iteration,objective,gradient_norm,seconds"
+"""The first line of the curve of a training, a table that is never read."""
+
 _MARKS = {"weights": "time (weights)", "markers": "time (markers)"}
 _LONGEST = max(map(len, _MARKS.values()))
+_QUOTED = re.compile(r'[",\r\n]')
 _NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 
 
@@ -94,9 +108,29 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     body = _body(take.time, values)
     markers = take.params is None and take.source.kind == "markers"
     mark = _MARKS["markers" if markers else "weights"]
-    clock = "time" if _reads_back(names, body, markers) else mark
+    plain = _header(["time", *names])
+    header = plain if _is_own(plain) and _reads_back(names, body, markers) else None
     with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        file.write(_header([clock, *names]) + body.replace("nan", ""))
+        file.write((header or _header([mark, *names])) + body.replace("nan", ""))
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a table, or the curve of a training."""
+    beginning = read_beginning(path, MAX_HEADER).decode(errors="replace")
+    return beginning.startswith(f"{CURVE}\n") or _is_own(beginning)
+
+
+def _is_own(text: str) -> bool:
+    """Whether a table that begins so is facert's: its first line is as `_header` writes it.
+
+    Some writers quote all names, or all text. Where that would be the same line, the first cell
+    must state what the columns are.
+    """
+    cells = next(csv.reader(io.StringIO(text, newline="")), [])
+    if not cells or not text.startswith(_header(cells)):
+        return False
+    unquoted = [cell for cell in cells[1:] if not _QUOTED.search(cell)]
+    return cells[0] in _MARKS.values() or not all(map(_NUMBER.fullmatch, unquoted))
 
 
 def _is_marked(text: str) -> bool:
@@ -137,9 +171,11 @@ def _body(time: FloatArray, values: FloatArray) -> str:
 
 
 def _header(cells: Sequence[str]) -> str:
+    """The first line of a table, with quotes around its first cell, and around others as needed."""
+    first, *others = cells
     line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(cells)
-    return line.getvalue()
+    csv.writer(line, lineterminator="\n").writerow(others)
+    return f'"{first}",{line.getvalue()}'
 
 
 def _reads_back(names: Sequence[str], body: str, markers: bool) -> bool:

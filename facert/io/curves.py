@@ -8,12 +8,14 @@
 ``numPoses``       P, optional             checked, as ``numFrames``, T
 ``startTimecode``  text, optional          of the first frame
 ``trackPath``      text, optional          the sound; passed over, and written empty
+``createdBy``      text, optional          passed over; written first: facert's mark
 =================  ======================  ====================================================
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,13 +26,20 @@ from facert.data.arrays import FloatArray
 from facert.data.clock import put_together
 from facert.data.rate import standard_rate
 from facert.data.take import Source, Take, named_curves
+from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.guarded import read_text
+from facert.io.guarded import read_beginning, read_text
 
 _NAMES = ("facsNames", "names", "blendShapeNames")
 _VALUES = ("weightMat", "weights")
 _RATES = ("exportFps", "fps")
+# Of curves and a pose the first key; of an evaluation a key of its settings, which come first.
+_MARK = re.compile(
+    rf'\s*\{{\s*(?:"settings"\s*:\s*\{{[^{{}}]*)?"created_?by"\s*:\s*"{MARK}'.encode(),
+    re.IGNORECASE,
+)
+_BEGINNING = 2**16  # bytes that have the settings
 
 
 def read_curves(path: Path, fps: float | None = None) -> Take:
@@ -76,6 +85,7 @@ def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:
         names, values = named_curves(take)
     rows = [[None if value != value else value for value in row] for row in values.tolist()]
     document = {
+        "createdBy": CREATED_BY,
         "exportFps": take.fps,
         "trackPath": "",
         "startTimecode": take.start_timecode,
@@ -87,6 +97,11 @@ def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:
     }
     with replacing(path, overwrite) as temporary:
         temporary.write_text(json.dumps(document, allow_nan=False), encoding="utf-8")
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a JSON file: curves, a pose or an evaluation."""
+    return _MARK.match(read_beginning(path, _BEGINNING)) is not None
 
 
 def read_json_object(path: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import re
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.version import MARK
 from facert.errors import InputError, reading
 from facert.io.curves import parse_json_object
 from facert.io.gltf_compression import MESHOPT, decompressed
-from facert.io.guarded import moderate_file, parsing
+from facert.io.guarded import moderate_file, parsing, read_beginning
 
 MAX_VALUES = 2**27
 """Most numbers of one array: 1 GiB of float64."""
@@ -35,6 +37,7 @@ _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _DRACO = "KHR_draco_mesh_compression"
 _EMBEDDED = ";base64,"
+_GENERATOR = re.compile(rf'"generator"\s*:\s*"{MARK}'.encode())
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,11 @@ def open_gltf(path: Path) -> Iterator[Document]:
     path = Path(path)
     with reading(path), parsing("file", "valid glTF 2.0"):
         yield _document(path)
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a glTF file, by its generator, which stands near the beginning."""
+    return _GENERATOR.search(read_beginning(path)) is not None
 
 
 def _document(path: Path) -> Document:

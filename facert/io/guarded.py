@@ -39,6 +39,15 @@ def moderate_file(path: Path, most: int = MAX_BYTES) -> Path:
     return path
 
 
+def read_beginning(path: Path, most: int = 2**12) -> bytes:
+    """Read the first bytes of a file, however large it is.
+
+    Raises `InputError` when there is no file that may be read.
+    """
+    with existing_file(path).open("rb") as file:
+        return file.read(most)
+
+
 def read_text(path: Path) -> str:
     """Read a UTF-8 text file, with or without a byte order mark.
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
-from facert.data.version import CREATED_BY
+from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.guarded import existing_file
@@ -229,6 +229,12 @@ def stated_format(path: Path) -> str:
         return ""
     with open_guarded(path) as file:
         return file.text_attribute("format")
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote an HDF5 file, by the attribute created_by."""
+    with open_guarded(path) as file:
+        return file.text_attribute("created_by").startswith(MARK)
 
 
 def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:

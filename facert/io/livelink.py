@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import logging
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -38,16 +39,29 @@ from facert.data.timecode import (
 from facert.data.timecode_column import TimecodeClock, read_timecodes
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
+from facert.io.guarded import read_beginning
 from facert.io.lines import Line, check_width, read_csv, to_numbers
 
 log = logging.getLogger("facert")
 
 _LEADING = ("Timecode", "BlendShapeCount")
+# The app writes 10 decimals; one more does no importer harm, and shows that facert wrote the file.
+# Importers look for the header, unquoted, and take every further column for a shape.
+_DECIMALS = 11
+_ROW = re.compile(
+    rb"\n[^,\n]*,%d(?:,-?\d+\.\d{%d}){%d}\n" % (len(ARKIT_NAMES), _DECIMALS, len(ARKIT_NAMES))
+)
+_BEGINNING = 2**16  # bytes that have a row with a face
 
 
 def is_livelink(header: Sequence[str]) -> bool:
     """Whether a CSV file with this header is one of Live Link Face."""
     return tuple(cell.lower() for cell in header[:2]) == tuple(name.lower() for name in _LEADING)
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a Live Link Face CSV, by the number of decimals."""
+    return _ROW.search(read_beginning(path, _BEGINNING)) is not None
 
 
 def read_livelink(path: Path, fps: float | None = None) -> Take:
@@ -195,7 +209,7 @@ def _arkit_columns(take: Take) -> FloatArray:
 
 def _rows(codes: Sequence[str], columns: FloatArray, known: BoolArray) -> list[list[str]]:
     """The cells of the file, one list a frame."""
-    template = ",".join(["%.10f"] * columns.shape[1])
+    template = ",".join([f"%.{_DECIMALS}f"] * columns.shape[1])
     count = str(columns.shape[1])
     return [
         [code, count, *(template % tuple(row)).split(",")] if face else [code, "0"]

@@ -7,13 +7,15 @@ first path of its kind. Whatever lists endings (messages, help, the table in the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from facert.errors import InputError, OutputExistsError
+from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.io.content import endings_by_content
+from facert.io.guarded import parsing
 
 Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
 Use = Literal["read", "write"]
@@ -43,6 +45,8 @@ class Format:
     have to be even: the frame before, or a row that says so; empty where rows have their times."""
     mixed: str = ""
     """From the path to whether columns of that file may be no weights: a clock, a flag."""
+    mark: str = ""
+    """From the path to whether facert wrote that very file; without it, facert writes none."""
     about: str = ""
     """What writes such takes, for ``--help``."""
     reads: str = ""
@@ -64,6 +68,7 @@ FORMATS = (
             "mesh sequence": "mesh_sequence.write_mesh_sequence",
         },
         kind_of="hdf5.kind_of",
+        mark="hdf5.bears_mark",
         reads="take, rig or mesh sequence",
         writes="take, rig or mesh sequence",
     ),
@@ -71,6 +76,7 @@ FORMATS = (
         (".livelink.csv",),  # read as .csv: the header decides
         write={"take": "livelink.write_livelink"},
         missing="marked",
+        mark="livelink.bears_mark",
         reads="Live Link Face",
         writes="poses (else source weights), if they are ARKit's",
     ),
@@ -79,6 +85,7 @@ FORMATS = (
         read={"take": "csv_table.read_csv_take"},
         write={"take": "csv_table.write_table"},
         mixed="csv_table.is_mixed",
+        mark="csv_table.bears_mark",
         about=" of Live Link Face, another tracker or plain",
         reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y "
         "NAME.z` or weights; of OpenFace, MediaPipe, Vicon and others; separated by commas, or by "
@@ -91,12 +98,19 @@ FORMATS = (
         write={"take": "curves.write_curves"},
         mixed="tracker_json.is_mixed",
         missing="held",
+        mark="curves.bears_mark",
         about=" of Audio2Face or a tracker",
         reads="Audio2Face curves; frames of MediaPipe, BEAT and others: a list of objects, one a "
         "line, or columns",
         writes="poses (else source weights)",
     ),
-    Format((".txt",), {"take": "facecap.read_facecap"}, about=" of Face Cap", reads="Face Cap"),
+    Format(
+        (".txt",),
+        {"take": "facecap.read_facecap"},
+        mark="csv_table.bears_mark",  # of the curve of a training
+        about=" of Face Cap",
+        reads="Face Cap",
+    ),
     Format(
         (".tsv", ".tab"),
         {"take": "csv_table.read_csv_take"},
@@ -135,11 +149,13 @@ FORMATS = (
     Format(
         (".glb",),
         write={"morphs": "glb.write_glb"},
+        mark="gltf.bears_mark",
         writes="by `convert`: a rig, a take with `--rig`, a mesh sequence",
     ),
     Format(
         (".usd", ".usda", ".usdc"),
         write={"morphs": "usd.write_usd"},
+        mark="usd.bears_mark",
         writes="the same (`pip install 'facert[usd]'`)",
     ),
     Format(
@@ -154,6 +170,12 @@ FORMATS = (
     ),
     Format((".obj",), {"mesh": "obj.read_obj"}, reads="a mesh at rest, for `drive`"),
     Format((".ply",), {"mesh": "ply.read_ply"}, reads="a mesh at rest, for `drive`"),
+    Format(
+        (".safetensors",),
+        mark="tensors.bears_mark",
+        reads="a model, by `--model`",
+        writes="a model, by `train`",
+    ),
     Format(
         (FOLDER,),
         {"rig": "obj.read_obj_folder"},
@@ -206,19 +228,56 @@ def function(name: str) -> Callable[..., Any]:
     return found
 
 
-def require_output(path: Path, overwrite: bool, *kinds: Kind) -> Format:
-    """The format to write one of these kinds to, found before any work is done.
+def is_foreign(path: Path) -> bool:
+    """Whether there is a file of a format that facert reads or writes, and facert did not write it.
 
-    Raises `InputError` for an ending to which none of them is written, and `OutputExistsError` when
-    `path` exists and `overwrite` is not set.
+    It is of a format by its ending or by its content, and facert's by the format's mark. An empty
+    file is nobody's; one that cannot be read is somebody's.
+    """
+    if not path.is_file() or not path.stat().st_size:
+        return False
+    name, held = path.name.lower(), set(endings_by_content(path, likely=True))
+    formats = [one for one in FORMATS if name.endswith(one.endings) or held & set(one.endings)]
+    if not formats:
+        return False
+    with suppress(InputError), parsing("file", "one that bears a mark"):
+        return not any(function(one.mark)(path) for one in formats if one.mark)
+    return True
+
+
+def require_replaceable(path: Path, overwrite: bool) -> None:
+    """Refuse to replace an existing file, before any work is done.
+
+    Raises `OutputKeptError`, whatever `overwrite` is, when it `is_foreign`: a recording or a
+    character that came from elsewhere cannot be made anew. Else raises `OutputExistsError` unless
+    `overwrite` is set.
+    """
+    if is_foreign(path):
+        raise OutputKeptError(path)
+    if path.exists() and not overwrite:
+        raise OutputExistsError(path)
+
+
+def output_format(path: Path, *kinds: Kind) -> Format:
+    """The format to write one of these kinds to, whether `path` exists or not.
+
+    Raises `InputError` for an ending to which none of them is written.
     """
     found = format_of(path, "write", *kinds)
     if found is None:
         known = ", ".join(endings("write", *kinds))
         fix = "Choose a name for the output that ends so."
         raise InputError("output's ending", known, _ending(path), fix, where=str(path))
-    if path.exists() and not overwrite:
-        raise OutputExistsError(path)
+    return found
+
+
+def require_output(path: Path, overwrite: bool, *kinds: Kind) -> Format:
+    """The format to write one of these kinds to, found before any work is done.
+
+    Raises what `output_format` and `require_replaceable` raise.
+    """
+    found = output_format(path, *kinds)
+    require_replaceable(path, overwrite)
     return found
 
 

@@ -24,9 +24,10 @@ them; reading passes over these and over anything else that it does not know.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,18 @@ from numpy.typing import NDArray
 from facert.data.arrays import require_shape
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.io.hdf5 import TAKE_FORMAT, GuardedFile, NewFile, create, open_guarded
+from facert.io.guarded import parsing
+from facert.io.hdf5 import (
+    TAKE_FORMAT,
+    GuardedFile,
+    NewFile,
+    create,
+    open_guarded,
+    stated_format,
+)
 
 VERSION = 1
+_LOOKED_AT = 2**18  # numbers of poses that show what a take is
 
 
 def read_take(path: Path) -> Take:
@@ -59,6 +69,42 @@ def read_take(path: Path) -> Take:
             up_axis=file.text_attribute("up_axis"),
             created_by=file.text_attribute("created_by"),
         )
+
+
+def holds_result(path: Path) -> bool:
+    """Whether a file is a take all of whose poses were predicted, as far as its beginning shows."""
+    poses = _first_poses(path)
+    return poses is not None and poses.predicted and not poses.open
+
+
+def holds_recording(path: Path) -> bool:
+    """Whether a file is a take with frames that have no pose, as far as its beginning shows."""
+    poses = _first_poses(path)
+    return poses is not None and poses.open and not poses.predicted
+
+
+class _Poses(NamedTuple):
+    """Poses of the first frames of a take."""
+
+    predicted: bool
+    """Whether they have a standard deviation."""
+    open: bool
+    """Whether any of the frames has none."""
+
+
+def _first_poses(path: Path) -> _Poses | None:
+    """The poses of the first frames of a take; None for any other file."""
+    with suppress(InputError), parsing("file", "a take"):
+        if stated_format(path) != TAKE_FORMAT:
+            return None
+        with open_guarded(path) as file:
+            if "/target/params" not in file:
+                return _Poses(predicted=False, open=True)
+            rows = file.rows("/target/params")
+            count = max(1, min(rows.shape[0], _LOOKED_AT // max(1, rows.shape[1])))
+            unposed = np.isnan(rows.read(np.arange(count))).all(axis=1)
+            return _Poses("/target/std" in file, bool(unposed.any()))
+    return None
 
 
 def write_take(

@@ -19,12 +19,13 @@ from safetensors.numpy import load, save
 from facert.data.arrays import FloatArray
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.guarded import moderate_file
+from facert.io.guarded import moderate_file, read_beginning
 
 MAX_HEADER = 16 << 20  # bytes
 MAX_FILE = 4 << 30
 MAX_TENSORS = 256
 _KEY = "facert"  # safetensors metadata maps strings to strings; ours is one JSON document
+_BEGINNING = f'{{"__metadata__":{{"{_KEY}":'.encode()  # metadata come first
 
 
 def write_tensors(
@@ -65,6 +66,11 @@ def read_tensors(path: Path, expected: str) -> tuple[dict[str, FloatArray], dict
             if array.dtype != np.float64 or not np.isfinite(array).all():
                 raise _damaged(name, "finite float64 numbers", f"{array.dtype}, or NaN")
         return arrays, metadata
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a safetensors file, by its metadata."""
+    return read_beginning(path)[8:].startswith(_BEGINNING)
 
 
 def _read_checked(path: Path) -> bytes:

@@ -6,19 +6,25 @@ among what facert needs, so it may have to be installed.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from facert.data.units import in_metres
-from facert.data.version import CREATED_BY
+from facert.data.version import CREATED_BY, MARK
 from facert.errors import FacertError, InputError
 from facert.io.atomic import replacing
+from facert.io.guarded import read_beginning
 from facert.mesh.morphs import Morphs
 
 _ROOT = "/face"
 _JOINT = "root"
+_MARKS = (
+    re.compile(rf'#usda \S+\s*\(\s*"{MARK}'.encode()),
+    re.compile(rf"PXR-USDC.*\0{MARK}".encode(), re.DOTALL),
+)
 
 
 def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
@@ -43,8 +49,26 @@ def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
         mesh = _mesh(stage, morphs)
         _bind(stage, mesh, _animation(stage, morphs, tokens), len(morphs.neutral.vertices))
         _blend_shapes(stage, mesh, morphs, tokens)
-        stage.GetRootLayer().comment = CREATED_BY
+        _mark(stage.GetRootLayer())
         stage.GetRootLayer().Save()
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a USD file, by what `_mark` left at its beginning."""
+    beginning = read_beginning(path)
+    return any(pattern.match(beginning) for pattern in _MARKS)
+
+
+def _mark(layer: Any) -> None:
+    """Name facert in the layer's comment, where a text file begins with it.
+
+    A binary one compresses text, but begins with the first array of bytes as they are.
+    """
+    from pxr import Vt
+
+    layer.comment = CREATED_BY
+    if layer.GetFileFormat().formatId != "usda":
+        layer.customLayerData = {"createdBy": Vt.UCharArray(list(CREATED_BY.encode()))}
 
 
 def _pxr() -> tuple[Any, Any, Any]:

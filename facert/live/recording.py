@@ -15,8 +15,9 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.rate import nominal_rate
 from facert.data.take import Controls, Source, Take
-from facert.errors import FacertError, InputError, OutputExistsError
+from facert.errors import FacertError, InputError
 from facert.io.formats import write_take_file
+from facert.io.registry import is_foreign, require_replaceable
 from facert.live.frames import Frame, frame_pattern
 
 if TYPE_CHECKING:
@@ -119,8 +120,7 @@ class _Record(ABC):
         return Source(values.reshape(-1, *like.values.shape[1:]), like.names)
 
     def _rehearse(self) -> None:
-        if self._path.exists() and not self._overwrite:
-            raise OutputExistsError(self._path)
+        require_replaceable(self._path, self._overwrite)
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=self._path.parent) as folder:
@@ -136,7 +136,7 @@ class _Record(ABC):
 
     def _write(self, take: Take, path: Path) -> Path:
         """Write the take beside a file that appeared meanwhile: both are precious."""
-        place = path if self._overwrite else _free(path)
+        place = path if self._overwrite and not is_foreign(path) else _free(path)
         write_take_file(take, place, self._overwrite)
         if place != path:
             log.warning("%s appeared meanwhile: written to %s", path, place)

@@ -11,7 +11,9 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.version import CREATED_BY
-from facert.errors import InputError, OutputExistsError
+from facert.errors import InputError
+from facert.io.csv_table import CURVE
+from facert.io.registry import require_replaceable
 from facert.io.tensors import read_tensors, write_tensors
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State
@@ -36,9 +38,15 @@ class CheckpointFile(Monitor):
         The file; replaced whole at every checkpoint, so that it is never half-written.
     resume : bool
         Continue from the file if it is there.
+
+    Raises
+    ------
+    OutputKeptError
+        When facert did not write the file that is there.
     """
 
     def __init__(self, path: Path, resume: bool) -> None:
+        require_replaceable(path, overwrite=True)
         if path.exists() and not resume:
             log.warning("%s is of an earlier run and will be replaced; --resume continues it", path)
         self.path, self._resume = path, resume
@@ -107,12 +115,11 @@ class CurveLog(Monitor):
     Raises
     ------
     OutputExistsError
-        When the file exists and neither is set.
+        When the file exists and neither is set, or it is not a curve of facert's.
     """
 
     def __init__(self, path: Path, overwrite: bool, goes_on: bool = False) -> None:
-        if path.exists() and not (overwrite or goes_on):
-            raise OutputExistsError(path)
+        require_replaceable(path, overwrite or goes_on)
         self.path = path
         self._goes_on = goes_on and path.exists()
         self._began = time.perf_counter()
@@ -123,7 +130,7 @@ class CurveLog(Monitor):
             return None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text("iteration,objective,gradient_norm,seconds\n", encoding="utf-8")
+            self.path.write_text(f"{CURVE}\n", encoding="utf-8")
         except OSError as error:
             raise InputError(
                 "--log",

@@ -38,11 +38,12 @@ def test_a_folder_is_done_file_by_file_and_a_bad_one_stops_none(facert, folder, 
 def test_what_is_there_already_is_left_alone_unless_asked_otherwise(facert, folder):
     takes, out = [folder / f"take{seed}.h5" for seed in range(3)], folder / "out"
     out.mkdir()
-    (out / "take1.h5").write_text("mine")
+    before = takes[1].read_bytes()
+    (out / "take1.h5").write_bytes(before)
     done = facert("clean", *takes, "--out-dir", out)
     assert done.code == 0
     assert "exists" in done.out
-    assert (out / "take1.h5").read_text() == "mine"
+    assert (out / "take1.h5").read_bytes() == before
     assert facert("clean", *takes, "--out-dir", out, "--overwrite").code == 0
     assert api.read_take(out / "take1.h5").source.valid.all()
 

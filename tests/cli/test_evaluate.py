@@ -99,9 +99,10 @@ def test_another_take_is_tested(facert, take, make_take, tmp_path):
 
 def test_existing_outputs_are_kept(facert, take, tmp_path):
     out = tmp_path / "out.json"
-    out.write_text("mine")
+    assert facert("eval", take, *QUICK, "--json", out).code == 0
+    before = out.read_text()
     assert facert("eval", take, *QUICK, "--json", out).code == 2
-    assert out.read_text() == "mine"
+    assert out.read_text() == before
     assert facert("eval", take, *QUICK, "--json", out, "--overwrite").code == 0
     assert json.loads(out.read_text())["rows"]
 

@@ -57,10 +57,17 @@ def test_two_takes_without_a_folder_get_its_option_named(facert, table: Path) ->
     other = table.with_name("other.csv")
     other.write_text(TABLE)
     refused = facert("retarget", table, other)
+    assert refused.code == 3
+    message = " ".join(refused.err.split())
+    assert "Give another name, or delete it yourself; for two takes, --out-dir DIR." in message
+    assert other.read_text() == TABLE
+    take = package.read_take(other)
+    package.write_take(take, first := table.with_name("first.h5"))
+    package.write_take(take, second := table.with_name("second.h5"))
+    refused = facert("retarget", first, second)
     assert refused.code == 2
     message = " ".join(refused.err.split())
     assert "the file exists. Give another name, or --overwrite; for two takes, --out-dir" in message
-    assert other.read_text() == TABLE
 
 
 def test_a_model_that_is_not_there_gets_its_option_named(facert, table: Path) -> None:

@@ -169,12 +169,13 @@ def test_what_cannot_work_is_refused_before_the_show(facert, files, arguments, c
 
 
 def test_an_output_that_exists_is_refused(facert, files, tmp_path):
-    (tmp_path / "out.h5").write_text("precious")
+    before = files[0].read_bytes()
+    (tmp_path / "out.h5").write_bytes(before)
     done = facert(
         "live", "-m", files[1], "--in", "livelink:0", "--out", f"h5:{tmp_path / 'out.h5'}"
     )
     assert done.code == 2
-    assert (tmp_path / "out.h5").read_text() == "precious"
+    assert (tmp_path / "out.h5").read_bytes() == before
 
 
 @contextmanager

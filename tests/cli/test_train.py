@@ -10,6 +10,8 @@ import pytest
 
 import facert as api
 from facert.cli.commands.train import _shown
+from facert.io.csv_table import CURVE
+from facert.io.tensors import write_tensors
 from facert.retarget.checkpoint import checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
@@ -76,17 +78,18 @@ def test_the_curve_is_logged(facert, take, model, tmp_path):
 
 
 def test_existing_outputs_stay_unless_they_may_be_replaced(facert, take, model, tmp_path):
-    model.write_text("mine")
+    assert facert("train", take, "-o", model, *QUICK).code == 0
+    before = model.read_bytes()
     refused = facert("train", take, "-o", model, *QUICK)
     assert refused.code == 2
     assert "--overwrite" in refused.err
-    assert model.read_text() == "mine"
+    assert model.read_bytes() == before
     assert facert("train", take, "-o", model, "--overwrite", *QUICK).code == 0
-    (tmp_path / "curve.csv").write_text("mine")
+    (tmp_path / "curve.csv").write_text(CURVE + "\n")
     other = tmp_path / "other.safetensors"
     options = ("--log", tmp_path / "curve.csv", *QUICK, *SHARED)
     assert facert("train", take, "-o", other, *options).code == 2
-    assert (tmp_path / "curve.csv").read_text() == "mine"
+    assert (tmp_path / "curve.csv").read_text() == CURVE + "\n"
     assert not other.exists()
 
 
@@ -195,12 +198,13 @@ def test_a_method_that_learns_in_one_go_warns_of_what_it_has_no_use_for(
 
 def test_a_method_that_learns_in_one_go_leaves_the_checkpoint_of_another_alone(facert, take, model):
     checkpoint_path(model).write_text("where another run stopped")
-    model.write_text("mine")
+    write_tensors(model, {}, {})
+    before = model.read_bytes()
 
     refused = facert("train", take, "-o", model, "--resume")
     assert refused.code == 2
     assert idle("--resume") in refused.err
-    assert model.read_text() == "mine"
+    assert model.read_bytes() == before
     assert facert("train", take, "-o", model, "--overwrite").code == 0
     assert checkpoint_path(model).read_text() == "where another run stopped"
 

@@ -72,9 +72,9 @@ def test_poses_are_written_before_the_source(path):
     take = Take(time=[0.0, 0.1], source=source, controls=Controls(["a,b", "c"]),
                 params=[[1.0, 2.0], [np.nan, np.nan]])  # fmt: skip
     write_table(take, path)
-    assert path.read_text() == 'time,"a,b",c\n0,1,2\n0.1,,\n'
+    assert path.read_text() == '"time","a,b",c\n0,1,2\n0.1,,\n'
     write_table(replace(take, params=None, controls=None), path, overwrite=True)
-    assert path.read_text() == "time,m.x,m.y,m.z\n0,0,0,0\n0.1,0,0,0\n"
+    assert path.read_text() == '"time",m.x,m.y,m.z\n0,0,0,0\n0.1,0,0,0\n'
 
 
 @settings(deadline=None, max_examples=25)

@@ -158,7 +158,7 @@ def test_a_file_of_one_matrix_that_is_whole_needs_no_word(make_take, tmp_path, p
 
 
 def test_an_output_is_refused_before_any_work(tmp_path):
-    (tmp_path / "there.h5").write_text("mine")
+    formats.write_take_file(TAKE, tmp_path / "there.h5")
     with pytest.raises(OutputExistsError, match=r"there\.h5"):
         require_output(tmp_path / "there.h5", False, "take")
     with pytest.raises(InputError, match=r"\.livelink\.csv, \.csv, \.json, found '\.glb'"):

@@ -98,9 +98,9 @@ def test_only_what_would_be_read_otherwise_states_its_columns(folder):
     path = folder / "b.csv"
     take = Take(TIME, Source(columns_of("ab", ["weight"] * 2), ["jawOpen", "frame"]))
     write_table(take, path)
-    assert path.read_text().startswith("time (weights),jawOpen,frame\n")
+    assert path.read_text().startswith('"time (weights)",jawOpen,frame\n')
     write_table(Take(TIME, Source(take.source.values, ["a", "b"])), path, overwrite=True)
-    assert path.read_text().startswith("time,a,b\n")
+    assert path.read_text().startswith('"time",a,b\n')
 
 
 def test_a_header_may_state_that_columns_are_markers(folder):

@@ -56,10 +56,11 @@ def test_the_same_content_gives_the_same_bytes(path, tmp_path):
 
 
 def test_an_existing_file_stays_unless_it_may_be_replaced(path):
-    path.write_text("mine")
+    write_tensors(path, {"other": np.ones(3)}, METADATA)
+    before = path.read_bytes()
     with pytest.raises(OutputExistsError):
         write_tensors(path, ARRAYS, METADATA)
-    assert path.read_text() == "mine"
+    assert path.read_bytes() == before
     write_tensors(path, ARRAYS, METADATA, overwrite=True)
     assert read_tensors(path, "facert-model")
 

@@ -6,7 +6,7 @@ import pytest
 
 import facert
 from facert.data.take import Controls
-from facert.errors import InputError, OutputExistsError
+from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.live.frames import Frame, frame_pattern
 from facert.live.recording import Recordings
 from facert.retarget.stream import Streamed
@@ -81,10 +81,23 @@ def test_poses_are_written_with_their_std_and_the_cleaned_source(recordings, tmp
 
 
 def test_a_file_that_exists_is_refused_before_the_show(recordings, tmp_path):
-    (tmp_path / "in.h5").write_text("precious")
+    path = tmp_path / "in.h5"
+    facert.write_take(frame_pattern("ab"), path)
+    before = path.read_bytes()
     with pytest.raises(OutputExistsError):
-        recordings().source(tmp_path / "in.h5")
-    recordings(overwrite=True).source(tmp_path / "in.h5")
+        recordings().source(path)
+    recordings(overwrite=True).source(path)
+    assert path.read_bytes() == before
+    path.write_text("precious")
+    with pytest.raises(OutputKeptError):
+        recordings(overwrite=True).source(path)
+
+
+def test_a_recording_that_appears_during_the_show_stays_even_with_overwrite(recordings, tmp_path):
+    files = recordings(overwrite=True)
+    files.source(tmp_path / "in.h5").add(WEIGHTS[0])
+    (tmp_path / "in.h5").write_text("precious")
+    assert files.write("") == [tmp_path / "in-2.h5"]
     assert (tmp_path / "in.h5").read_text() == "precious"
 
 

@@ -3,7 +3,7 @@ import logging
 import numpy as np
 import pytest
 
-from facert.errors import InputError, OutputExistsError
+from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.io.tensors import write_tensors
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State
@@ -96,10 +96,24 @@ def test_the_curve_is_written_as_training_goes(tmp_path):
 
 def test_an_existing_curve_stays_unless_it_may_be_replaced(tmp_path):
     path = tmp_path / "curve.csv"
-    path.write_text("mine")
+    CurveLog(path, overwrite=False).resume("a")
+    before = path.read_text()
     with pytest.raises(OutputExistsError):
         CurveLog(path, overwrite=False)
-    assert path.read_text() == "mine"
+    assert path.read_text() == before
+
+
+def test_a_recording_is_neither_replaced_nor_added_to(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("time,jawOpen\n0,0.5\n")
+    for goes_on in (False, True):
+        with pytest.raises(OutputKeptError):
+            CurveLog(path, overwrite=True, goes_on=goes_on)
+    assert path.read_text() == "time,jawOpen\n0,0.5\n"
+    checkpoint = checkpoint_path(tmp_path / "model.safetensors")
+    checkpoint.write_text("somebody's")
+    with pytest.raises(OutputKeptError):
+        CheckpointFile(checkpoint, resume=True)
 
 
 def test_no_curve_is_begun_before_training_is(tmp_path):

@@ -6,7 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
-from facert.cli.shared.batch import carry_out, plan, require_kept
+from facert.cli.shared.batch import carry_out, plan
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     ENDING,
     JOBS,
@@ -98,8 +99,9 @@ def command(
     from facert.io.poses import read_poses
     from facert.io.toml import read_toml
 
-    todo = plan(paths, out_dir, ending, jobs, overwrite, KINDS)
-    require_kept(todo, map_path, poses_path, rig_path)
+    others = (map_path, poses_path, rig_path)
+    require_inputs(*others)
+    todo = plan(paths, out_dir, ending, jobs, overwrite, KINDS, others)
     changes = Changes(
         names=read_toml(map_path) if map_path else {},
         poses=read_poses(poses_path, in_fps, keep or ()) if poses_path else None,

@@ -9,6 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, warn_of_unit
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, SHAPES, argument, file_option, option
 from facert.data.text import plural
 from facert.io.registry import endings
@@ -75,6 +76,7 @@ def command(
     from facert.topology.driving import FaceDriver, LooseParts
     from facert.topology.feature_points import Where, feature_points
 
+    require_inputs(mesh_path, points_path)
     require_name(output, overwrite, ENDINGS)
     if auto and map_path:
         raise typer.BadParameter("give --map or --auto, not both")

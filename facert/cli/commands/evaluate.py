@@ -11,6 +11,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_json, save_picture
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     DEVICE,
     OVERWRITE,
@@ -24,7 +25,8 @@ from facert.cli.shared.options import (
 )
 from facert.data.ranges import parse_range
 from facert.data.text import plural
-from facert.errors import InputError, OutputExistsError, reading
+from facert.errors import InputError, reading
+from facert.io.registry import require_replaceable
 from facert.methods.registry import REGISTRY
 
 if TYPE_CHECKING:
@@ -103,8 +105,9 @@ def command(
     facert eval facert-demo/training.h5 --methods ridge,nearest --repeats 3
     facert eval --labels 10..40 --json figures.json --plot figures.png
     """
-    if json_path is not None and json_path.exists() and not overwrite:
-        raise OutputExistsError(json_path)
+    require_inputs(take, across, rig)
+    if json_path is not None:
+        require_replaceable(json_path, overwrite)
     if plot is not None:
         require_name(plot, overwrite)
     if across is not None and split != "random":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, TARGET, TRUTH, argument, option
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -35,6 +36,7 @@ def command(
     from facert.render.faces import require_poses
     from facert.render.plots import plot_controls
 
+    require_inputs(take_path, truth_path)
     require_name(output, overwrite)
     ours, theirs = targets_for(target, take_path, truth_path)
     take = read_take_file(take_path, ours)

@@ -10,6 +10,7 @@ import typer
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
 from facert.cli.shared.help import Command, Group
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, SHAPES, argument, file_option, option
 from facert.data.text import plural
 
@@ -48,6 +49,7 @@ def suggest(
     from facert.render.sheet import draw_points
     from facert.topology.suggested_points import suggest_points
 
+    require_inputs(rig_path)
     if picture is not None:
         require_name(picture, overwrite)
     rig = read_rig_file(rig_path, shapes)

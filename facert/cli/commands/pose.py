@@ -9,6 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import save_json
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     ACTOR,
     DEFAULT_MODEL,
@@ -22,6 +23,7 @@ from facert.cli.shared.options import (
     file_option,
     option,
 )
+from facert.data.version import CREATED_BY
 from facert.errors import InputError, reading
 
 if TYPE_CHECKING:
@@ -100,6 +102,7 @@ def command(
     import facert
     from facert.io.registry import require_output
 
+    require_inputs(poses)
     if output is not None:
         require_output(output, overwrite, "take")
 
@@ -210,6 +213,6 @@ def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:
     from facert.io.formats import write_take_file
 
     if output.suffix.lower() == ".json":
-        save_json(done.as_dict, output, overwrite)
+        save_json({"created_by": CREATED_BY, **done.as_dict}, output, overwrite)
     else:
         write_take_file(done.as_take, output, overwrite)

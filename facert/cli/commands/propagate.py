@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.in_and_out import require_in_and_out, require_inputs
 from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, numbers, option
 from facert.data.text import plural
 from facert.io.registry import listed
@@ -63,10 +64,10 @@ def command(
 
     from facert.errors import reading
     from facert.io.formats import read_source_file, read_take_file, write_take_file
-    from facert.io.registry import require_output
     from facert.topology.propagated_takes import Propagation, propagate_poses, propagate_positions
 
-    require_output(output, overwrite, "take")
+    require_inputs(positions)
+    require_in_and_out(source, output, overwrite, "take", in_place=True)
     how = Propagation(method, window, dim, limits)
     if positions is None:
         take = read_take_file(source, target)

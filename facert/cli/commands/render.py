@@ -10,6 +10,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import PICTURES, require_name, save_picture
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, argument, file_option, option
 from facert.data.text import plural
 
@@ -55,6 +56,7 @@ def command(
     from facert.errors import reading
     from facert.io.formats import read_rig_file, targets_for
 
+    require_inputs(path, rig_path, truth_path, *(beside or []))
     require_name(output, overwrite, (*PICTURES, *CLIP_RATES))
     wanted, others = _parse(frames), [(one, one.stem) for one in beside or []]
     others += [(truth_path, "truth")] if truth_path else []

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_text
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH, argument, option
 from facert.data.text import plural
 
@@ -33,6 +34,7 @@ def command(
     facert report retargeted.h5 --rig facert-demo/character.h5
     facert report . -o whole-folder.html
     """
+    require_inputs(*results, rig_path, truth_path)
     require_name(output, overwrite, ENDINGS)
 
     from facert.io.formats import read_rig_file, read_take_file

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from facert.cli.shared import console
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import OVERWRITE, SEED, SHAPES, argument, numbers, option
 from facert.data.text import plural
 
@@ -40,6 +41,7 @@ def command(
     from facert.io.registry import require_output
     from facert.mesh.capture import simulate_capture
 
+    require_inputs(rig, weights)
     require_output(output, overwrite, "take")
     chosen = None if vertices is None else numbers(vertices, "--vertices")
     actor, performance = read_rig_file(rig, shapes), read_source_file(weights)

@@ -9,6 +9,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import read_observed, require_other_file, write_beside
+from facert.cli.shared.in_and_out import require_in_and_out
 from facert.cli.shared.options import NO_DETECT, OVERWRITE, TARGET, argument, file_option, option
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -50,10 +51,9 @@ def command(
     facert stabilise facert-demo/performance.h5 as-first.h5 --reference 0
     """
     from facert.io.formats import read_source_file, targets_for
-    from facert.io.registry import require_output
     from facert.preprocess.head_motion import stabilise
 
-    require_output(output, overwrite, "take")
+    require_in_and_out(source, output, overwrite, "take", in_place=True)
     require_other_file(source, output, "IN")
     if like is not None and reference != "mean":
         raise typer.BadParameter("--like and --reference both choose the head pose: give one")

@@ -10,6 +10,7 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import require_name, save_picture
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     AS_JSON,
     OVERWRITE,
@@ -70,6 +71,7 @@ def command(
 
     if rig_path is not None and sheet is None:
         raise typer.BadParameter("--rig is for the sheet: give --sheet as well")
+    require_inputs(take_path, rig_path)
     if sheet is not None:
         require_name(sheet, overwrite)
         if count > MAX_FRAMES:

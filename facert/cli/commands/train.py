@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, TARGET, argument, option
-from facert.errors import InputError, OutputExistsError, reading
+from facert.errors import InputError, reading
+from facert.io.registry import require_replaceable
 from facert.methods.registry import REGISTRY
 from facert.settings import (
     DEFAULTS,
@@ -96,6 +98,7 @@ def command(
     facert train facert-demo/training.h5
     facert train facert-demo/training.h5 --method gpr -o gpr.safetensors
     """
+    require_inputs(take, start, config)
     _require_output(output, curve)
     options["regions"] = _regions(regions := options["regions"])
 
@@ -117,8 +120,7 @@ def command(
     # An interrupted run leaves a model, and a checkpoint to continue from.
     continues = checkpoint is not None and checkpoint.continues
     overwrite_model = overwrite or continues
-    if output.exists() and not overwrite_model:
-        raise OutputExistsError(output)
+    require_replaceable(output, overwrite_model)
     data = replace(_read(take, target), std=None) if predicted else _read(take, target)
     _check_regions(regions, settings.regions, data)
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]

@@ -11,9 +11,10 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import identity, require_other_file
-from facert.errors import FacertError, InputError, OutputExistsError
+from facert.cli.shared.in_and_out import SWAPPED, require_in_and_out
+from facert.errors import FacertError, InputError, OutputExistsError, OutputKeptError
 from facert.evaluation.processes import call_each, cores
-from facert.io.registry import Kind, format_of, require_output
+from facert.io.registry import Kind, format_of, output_format, require_replaceable
 
 Work = Callable[[Path, Path], None]
 """Makes one file from another; must be picklable where there are several jobs."""
@@ -38,12 +39,13 @@ def plan(
     jobs: int | None,
     overwrite: bool,
     kinds: tuple[Kind, ...] = ("take",),
+    others: Sequence[Path | None] = (),
 ) -> Plan:
     """The plan of the options: IN and OUT, or files and folders of takes for `out_dir`.
 
     Results there are named after their sources, with `ending`, by default ``".h5"``, which must be
     that of a format for one of the `kinds`; `jobs` are by default 1, and 0 as many as there are
-    processor cores.
+    processor cores. `others` are read with the takes: no result may take their place.
 
     Raises
     ------
@@ -51,15 +53,18 @@ def plan(
         When there is nothing to do, two results would have the same name, or one would take the
         place of a file that is read, also with `overwrite`.
     OutputExistsError
-        For a single OUT that exists.
+        For a single OUT that exists and may not be replaced.
     """
     if out_dir is None:
-        return _single(paths, {"--ending": ending, "--jobs": jobs}, overwrite, kinds)
+        source, output = _single(paths, {"--ending": ending, "--jobs": jobs})
+        _require_kept([output], others)
+        _require_single(source, output, overwrite, kinds)
+        return Plan(((source, output),), many=False)
     if ending is not None and not ending.startswith("."):
         raise typer.BadParameter(f"write --ending with its dot: .{ending}")
     sources = [file for path in paths for file in _files(path)]
     outputs = [out_dir / (_stem(source) + (ending or ".h5")) for source in sources]
-    require_output(outputs[0], True, *kinds)
+    output_format(outputs[0], *kinds)
     twice = [name for name in outputs if outputs.count(name) > 1]
     if twice:
         expected, found = "files with a name each", f"two for {twice[0].name}"
@@ -69,14 +74,15 @@ def plan(
     if lost:
         expected = "another folder than that of the takes"
         raise InputError("--out-dir", expected, str(lost[0]), "Give another.")
+    _require_kept(outputs, others)
     out_dir.mkdir(parents=True, exist_ok=True)
     count = 1 if jobs is None else jobs or cores()
     return Plan(tuple(zip(sources, outputs, strict=True)), many=True, jobs=count)
 
 
-def require_kept(todo: Plan, *others: Path | None) -> None:
+def _require_kept(outputs: Sequence[Path], others: Sequence[Path | None]) -> None:
     """Refuse a result that would take the place of another file that is read with the takes."""
-    for _, output in todo.pairs:
+    for output in outputs:
         for other in others:
             if other is not None:
                 require_other_file(other, output, str(other))
@@ -87,45 +93,55 @@ def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
     if not todo.many:
         work(*todo.pairs[0])
         return
-    wanted = []
-    for source, output in todo.pairs:
-        if overwrite or not output.exists():
-            wanted.append((work, source, output))
-        else:
-            console.show(f"exists  {source}: {output} is there; --overwrite makes it anew")
-    failed = 0
-    for file, error in call_each(_attempt, wanted, todo.jobs, partial(_begin, console.log.level)):
+    wanted, failed = _writable(todo.pairs, overwrite)
+    there = len(todo.pairs) - len(wanted) - failed
+    for file, error in call_each(
+        _attempt, [(work, *pair) for pair in wanted], todo.jobs, partial(_begin, console.log.level)
+    ):
         failed += error is not None
         console.show(f"failed  {error}" if error else f"done    {file}")
     if failed:
-        there = len(todo.pairs) - len(wanted)
         left = f", {there} {'exists' if there == 1 else 'exist'} already" if there else ""
         console.err.print(f"{failed} of {len(todo.pairs)} files failed{left}", style="red")
         raise typer.Exit(1)
 
 
-def _single(
-    paths: Sequence[Path], many: dict[str, object], overwrite: bool, kinds: tuple[Kind, ...]
-) -> Plan:
-    """The plan for a single file, IN to OUT, without the options for many."""
+def _writable(
+    pairs: Sequence[tuple[Path, Path]], overwrite: bool
+) -> tuple[list[tuple[Path, Path]], int]:
+    """The pairs whose output may be written, and how many of the others failed by that."""
+    wanted, failed = [], 0
+    for source, output in pairs:
+        try:
+            require_replaceable(output, overwrite)
+        except OutputKeptError as error:
+            failed += 1
+            console.show(f"failed  {source}: {error}")
+        except OutputExistsError:
+            console.show(f"exists  {source}: {output} is there; --overwrite makes it anew")
+        else:
+            wanted.append((source, output))
+    return wanted, failed
+
+
+def _single(paths: Sequence[Path], many: dict[str, object]) -> tuple[Path, Path]:
+    """IN and OUT of a single file, without the options for many."""
     if len(paths) != 2:
         raise typer.BadParameter("give IN and OUT, or files with --out-dir DIR")
     for option, given in many.items():
         if given is not None:
             raise typer.BadParameter(f"{option} is for many files: give --out-dir DIR as well")
-    require_output(paths[1], True, *kinds)
-    if paths[1].exists():
-        require_other_file(paths[0], paths[1], "IN")
-        if not overwrite:
-            raise _SecondPathExistsError(paths[1])
-    return Plan(((paths[0], paths[1]),), many=False)
+    return paths[0], paths[1]
 
 
-class _SecondPathExistsError(OutputExistsError):
-    """Error that the second of two paths exists: perhaps both are takes to read."""
-
-    def __str__(self) -> str:
-        return f"{super().__str__().removesuffix('.')}; for two takes, --out-dir DIR."
+def _require_single(source: Path, output: Path, overwrite: bool, kinds: tuple[Kind, ...]) -> None:
+    """Refuse what cannot be read or written; two that are there may both be takes to read."""
+    try:
+        require_in_and_out(source, output, overwrite, *kinds)
+    except OutputExistsError as error:
+        if not error.fix.endswith(SWAPPED):
+            error.fix = f"{error.fix.removesuffix('.')}; for two takes, --out-dir DIR."
+        raise
 
 
 def _begin(level: int) -> None:

@@ -17,7 +17,7 @@ from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io import formats
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-from facert.io.registry import OWN_ENDINGS, Kind, require_output, write
+from facert.io.registry import OWN_ENDINGS, Kind, output_format, require_output, write
 from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
 from facert.render.faces import control_settings
 
@@ -85,7 +85,7 @@ def _content(take: Take, output: Path) -> str:
 def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take | Rig:
     """The take or the rig of a file; of one with both, the take where only that makes sense."""
     kind = wanted.kind
-    no_rig = not require_output(output, True, *KINDS).write.keys() & {"rig", "morphs"}
+    no_rig = not output_format(output, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or wanted.fps or changes.of_frames or no_rig):
         kind = "take"
     options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)

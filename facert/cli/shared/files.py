@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from facert.cli.shared import console
-from facert.errors import InputError, OutputExistsError, reading
+from facert.errors import InputError, reading
 from facert.io.atomic import replacing
+from facert.io.registry import require_replaceable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,8 +35,7 @@ def require_name(path: Path, overwrite: bool, endings: tuple[str, ...] = PICTURE
         expected = f"a name that ends in {', '.join(endings)}"
         found = repr(path.suffix) if path.suffix else "none"
         raise InputError("output", expected, found, "Give another name.", where=str(path))
-    if path.exists() and not overwrite:
-        raise OutputExistsError(path)
+    require_replaceable(path, overwrite)
 
 
 def require_other_file(source: Path, output: Path, name: str) -> None:
@@ -100,7 +100,7 @@ def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
         figure.savefig(temporary)
 
 
-def save_json(content: object, path: Path, overwrite: bool) -> None:
+def save_json(content: Mapping[str, object], path: Path, overwrite: bool) -> None:
     """Write JSON for people to read as well."""
     import json
 

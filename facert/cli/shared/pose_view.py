@@ -10,9 +10,10 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import read_actor, require_name
+from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import DEFAULT_MODEL
-from facert.errors import OutputExistsError, reading
+from facert.errors import reading
 
 if TYPE_CHECKING:
     from facert.data.rig import Rig
@@ -44,6 +45,7 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
 
     if files.rig is None:
         raise typer.BadParameter("--view draws the character: give its rig with --rig")
+    require_inputs(files.rig, files.take, files.actor)
     rig = read_rig_file(files.rig, files.shapes)
     take = None if files.take is None else read_take_file(files.take, files.target)
     session = _session(files, rig, take, overwrite)
@@ -74,13 +76,13 @@ def _session(files: Files, rig: Rig, take: Take | None, overwrite: bool) -> Posi
 
 def _require_output(output: Path, overwrite: bool) -> None:
     """Refuse names that could not be written to once an hour of posing is done."""
-    from facert.io.registry import OWN_ENDINGS
+    from facert.io.registry import OWN_ENDINGS, is_foreign, require_replaceable
 
     require_name(output, True, OWN_ENDINGS)
     for path in (output, output.with_suffix(".safetensors")):
-        if path.exists() and not overwrite:
+        if path.exists() and not overwrite and not is_foreign(path):
             console.log.info("to go on from its poses: --take %s --overwrite", output)
-            raise OutputExistsError(path)
+        require_replaceable(path, overwrite)
 
 
 def _model(files: Files) -> Retargeter | None:
