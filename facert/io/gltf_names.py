@@ -37,7 +37,8 @@ def target_names(document: Document) -> dict[int, tuple[str, ...]]:
     placed = dict.fromkeys(node["mesh"] for node in document.root["nodes"] if "mesh" in node)
     counts = {mesh: _count(document.root["meshes"][mesh]) for mesh in placed}
     counts = {mesh: count for mesh, count in counts.items() if count}
-    stated = {mesh: _stated(document, mesh, count) for mesh, count in counts.items()}
+    singles = names_of_single_targets(document.root)
+    stated = {m: _stated(document, m, count, singles) for m, count in counts.items()}
     nameless = [mesh for mesh, names in stated.items() if names is None]
     prefixes = dict(zip(nameless, _prefixes(document, nameless), strict=True))
     return {
@@ -50,7 +51,9 @@ def _count(mesh: dict[str, Any]) -> int:
     return max(len(primitive.get("targets", [])) for primitive in mesh["primitives"])
 
 
-def _stated(document: Document, number: int, count: int) -> list[str] | None:
+def _stated(
+    document: Document, number: int, count: int, singles: dict[tuple[int, int], str]
+) -> list[str] | None:
     """The names that a mesh's targets have somewhere, None without any; some may be empty."""
     mesh = document.root["meshes"][number]
     lists = list(_lists(mesh))
@@ -68,8 +71,7 @@ def _stated(document: Document, number: int, count: int) -> list[str] | None:
     accessors = _names_of_accessors(document, mesh)
     if len(accessors) == count and _differ(accessors) and all(accessors):
         return accessors
-    singles = names_of_single_targets(document.root, number)
-    expressions = [singles.get(index, "") for index in range(count)]
+    expressions = [singles.get((number, index), "") for index in range(count)]
     return expressions if any(expressions) and _differ(expressions) else None
 
 

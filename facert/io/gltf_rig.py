@@ -29,6 +29,8 @@ log = logging.getLogger("facert")
 _TRIANGLES = 4
 _GAMMA = 2.2
 UNITS = "m"
+SMALLEST, LARGEST = 0.005, 20.0
+"""Metres between which a face is, or the body that it belongs to."""
 TARGETS, EXPRESSIONS = "targets", "expressions"
 """What the shapes of a rig are: each morph target alone, or the expressions of a VRM avatar."""
 
@@ -79,6 +81,7 @@ def read_gltf_rig(path: Path, shapes: str | None = None) -> Rig:
             pairs = zip(parts, there, strict=True)
             parts = [_expressed(part, one.mesh, expressions) for part, one in pairs]
         whole = _welded(_united(parts))
+        _warn_of_size(whole.vertices)
         return Rig(whole.vertices, whole.targets, whole.names, whole.faces, UNITS, whole.colours)
 
 
@@ -130,6 +133,17 @@ def _part(scene: Scene, one: _Primitive, names: Sequence[str]) -> _PlacedMesh:
         faces=corners[:, ::-1] if mirrored(placement) else corners,
         colours=colours,
     )
+
+
+def _warn_of_size(vertices: FloatArray) -> None:
+    """Warn of a face that is no face's size in metres: exporters forget their unit."""
+    size = float(np.ptp(vertices, axis=0).max())
+    if not SMALLEST <= size <= LARGEST:
+        log.warning(
+            "the mesh is %.3g m large, as glTF counts in metres: where its numbers are of another "
+            "unit, give that: --in-units cm",
+            size,
+        )
 
 
 def _log_default_weights(

@@ -79,12 +79,12 @@ class Scene:
 def scene_of(document: Document) -> Scene:
     """The scene that the document shows first."""
     nodes = document.root["nodes"]
-    scenes = document.root.get("scenes") or [{"nodes": list(range(len(nodes)))}]
+    below = {child for node in nodes for child in node.get("children", [])}
+    tops = [index for index in range(len(nodes)) if index not in below]
+    scenes = document.root.get("scenes") or [{"nodes": tops}]
     worlds: dict[int, FloatArray] = {}
     shown = tuple(_walk(nodes, scenes[document.root.get("scene", 0)]["nodes"], worlds))
-    below = {child for node in nodes for child in node.get("children", [])}
-    outside = [index for index in range(len(nodes)) if index not in below]
-    for starts in (outside, range(len(nodes))):  # the latter for circles, which nothing leads to
+    for starts in (tops, range(len(nodes))):  # the latter for circles, which nothing leads to
         list(_walk(nodes, starts, worlds))
     return Scene(document, shown, worlds)
 

@@ -15,7 +15,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh, Rig
 from facert.errors import InputError, reading
-from facert.io.guarded import read_text
+from facert.io.guarded import read_old_text
 from facert.mesh.registration import registered
 
 log = logging.getLogger("facert")
@@ -63,7 +63,7 @@ def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
     vertices: list[list[float]] = []
     triangles: list[list[int]] = []
     with reading(path):
-        for number, line in enumerate(read_text(path).splitlines(), start=1):
+        for number, line in enumerate(read_old_text(path).splitlines(), start=1):
             keyword, *fields = line.split() or ("",)
             try:
                 if keyword == "v":

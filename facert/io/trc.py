@@ -69,7 +69,7 @@ def read_trc(path: Path) -> Take:
 
 def _facts(lines: Sequence[tuple[int, str]], head: int) -> dict[str, str]:
     """The facts before the names, by their lower-case names; the first line is checked."""
-    if len(lines) <= head or lines[0][1].split()[0] != _FIRST_WORD:
+    if len(lines) <= head or lines[0][1].split()[0].lower() != _FIRST_WORD.lower():
         found = repr(lines[0][1][:40]) if lines else "an empty file"
         raise InputError(
             "line 1", f"{_FIRST_WORD} and four more lines of a header", found, "Give a TRC file."
@@ -94,7 +94,14 @@ def _rows(lines: Sequence[tuple[int, str]]) -> list[Line]:
         rows = rows[1:]
     if not rows:
         raise InputError("file", "frames after the header", "none", "Export the file again.")
-    return with_points(rows)
+    return [
+        Line(row.number, ["" if _lost(c) else c for c in row.cells]) for row in with_points(rows)
+    ]
+
+
+def _lost(cell: str) -> bool:
+    """Whether a cell is a word for no number: of C's or MATLAB's, of a spreadsheet's."""
+    return "#" in cell or cell.lower() in ("-", "n/a", "na", "null", "none")
 
 
 def _names(line: tuple[int, str], rows: Sequence[Line]) -> tuple[str, ...]:

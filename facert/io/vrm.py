@@ -40,10 +40,10 @@ def expressions_of(root: dict[str, Any]) -> dict[str, list[Bind]]:
     return expressions
 
 
-def names_of_single_targets(root: dict[str, Any], mesh: int) -> dict[int, str]:
-    """Names of a mesh's targets, by index, that are each the whole of an expression."""
+def names_of_single_targets(root: dict[str, Any]) -> dict[tuple[int, int], str]:
+    """Names of targets, by mesh and index, that are each the whole of an expression."""
     single = {name: b[0] for name, b in expressions_of(root).items() if len(b) == 1}
-    return {b.target: name for name, b in single.items() if b.mesh == mesh and b.weight == 1.0}
+    return {(b.mesh, b.target): name for name, b in single.items() if b.weight == 1.0}
 
 
 def animated_expressions(root: dict[str, Any]) -> dict[int, str]:

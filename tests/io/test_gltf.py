@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pygltflib as gltf
 import pytest
+import trimesh
 from gltf_files import Builder
 
 from facert.data.labelling import weights_as_poses
@@ -232,3 +233,41 @@ def test_a_rig_without_an_animation_holds_no_take(builder, tmp_path, caplog) -> 
 def test_targets_without_names_are_numbered(builder: Builder, tmp_path: Path) -> None:
     builder.document.meshes[0].extras = {}
     assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == ("target1", "target2")
+
+
+def test_vertices_lie_where_another_library_has_them(tmp_path: Path) -> None:
+    builder = Builder()
+    random = np.random.default_rng(1)
+    for number in range(3):
+        points = np.float32(random.normal(size=(6, 3)))
+        turn = random.normal(size=4)
+        builder.mesh(
+            points,
+            {f"shape{number}": np.float32(random.normal(size=(6, 3)))},
+            translation=random.normal(size=3).tolist(),
+            rotation=(turn / np.linalg.norm(turn)).tolist(),
+            scale=[[1.0, 2.0, 0.5], [-1.0, 1.0, 1.0], [0.01, 0.01, 0.01]][number],
+        )
+    builder.document.nodes[1].children, builder.document.scenes[0].nodes = [2], [0, 1]
+    path = builder.save(tmp_path / "face.glb")
+    theirs = np.asarray(trimesh.load_scene(path).to_geometry().vertices)
+    ours = read_gltf_rig(path).neutral
+    order = [np.lexsort(np.round(points, 5).T) for points in (ours, theirs)]
+    np.testing.assert_allclose(ours[order[0]], theirs[order[1]], atol=1e-5)
+
+
+def test_without_a_scene_nodes_stand_below_their_parents(tmp_path: Path) -> None:
+    builder = Builder()
+    builder.mesh(TRIANGLE, {"smile": SMILE})
+    builder.document.nodes.append(gltf.Node(children=[0], scale=[2.0] * 3))
+    builder.document.scenes, builder.document.scene = [], None
+    rig = read_gltf_rig(builder.save(tmp_path / "face.glb"))
+    np.testing.assert_array_equal(rig.neutral, 2 * TRIANGLE)
+
+
+@pytest.mark.parametrize(("scale", "told"), [(200.0, True), (1.0, False), (1e-4, True)])
+def test_a_mesh_that_is_no_face_s_size_in_metres_is_logged(tmp_path, caplog, scale, told) -> None:
+    builder = Builder()
+    builder.mesh(TRIANGLE, {"smile": SMILE}, scale=[scale] * 3)
+    read_gltf_rig(builder.save(tmp_path / "face.glb"))
+    assert ("--in-units" in caplog.text) == told

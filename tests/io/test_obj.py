@@ -72,3 +72,9 @@ def test_a_folder_without_a_neutral_or_shapes_is_refused(tmp_path):
     (tmp_path / "smile.obj").write_text(SQUARE)
     with pytest.raises(InputError, match="/faces"):
         read_obj_folder(tmp_path)
+
+
+def test_names_in_an_old_encoding_are_no_harm(tmp_path):
+    path = tmp_path / "mesh.obj"
+    path.write_bytes(f"o M\xfcller\n{SQUARE}f 1 2 3\n".encode("latin-1"))
+    assert len(read_obj(path).vertices) == 4

@@ -67,6 +67,8 @@ def test_times_in_whole_milliseconds_agree_with_a_rate_that_has_none(path: Path,
         ("1\t0.0\t\t\t\t4\t5\t6", "brow"),
         ("1\t0.0\t0\t0\t0\t4\t5\t6", "brow"),
         ("1\t0.0\tNaN\tNaN\tNaN\t4\t5\t6", "brow"),
+        ("1\t0.0\t-1.#IND\t1.#QNAN\tn/a\t4\t5\t6", "brow"),
+        ("1\t0.0\t-\t-\t-\t4\t5\t6", "brow"),
         ("1\t0.0\t1\t2\t3\t\t\t", "chin"),
         ("1\t0.0\t1\t2\t3", "chin"),
         ("1\t0.0\t1\t2\t3\t4\t5\t", "chin"),
@@ -121,7 +123,7 @@ def require_same(path: Path, text: str | bytes) -> Take:
 
 
 FIRST, NAMES, VALUES, MARKERS, AXES = HEADER.splitlines()
-OTHER_FIRST = ["PathFileType  4\t(X/Y/Z) C:\\capture\\", "PathFileType 4 (X/Y/Z)", " PathFileType"]
+OTHER_FIRST = ["PathFileType  4\t(X/Y/Z) C:\\capture\\", "PathFileType 4 (X/Y/Z)", " pathfiletype"]
 OTHER_NAMES = [NAMES.replace("\t", " "), NAMES.replace("\t", "\t\t"), f"{NAMES}\t", f"\t{NAMES}"]
 OTHER_VALUES = [
     "  120.0\t\t  120.0\t\t    3\t\t     2\t\t mm\t  120.0\t  1\t  3",
