@@ -1,16 +1,18 @@
-"""The lists of changes: one TOML file for each room of the mathematics.
+"""The lists of changes: one TOML file for each part of the mathematics.
 
 A change replaces a text that occurs once in a file of the package:
 
-    [[change]]
-    what = "scaled conjugate gradients: Fletcher-Reeves in place of Møller's beta"
-    file = "models/optim/scg.py"
-    old = "trial_gradient @ (trial_gradient - gradient)"
-    new = "trial_gradient @ trial_gradient"
+    [[file]]
+    path = "models/optim/scg.py"
     tests = ["models/optim/test_moller.py"]
 
-The tests that should notice are few and quick. A change that no test can notice, as nothing that
-anybody sees depends on it, has a `reason`.
+    [[file.change]]
+    what = "Fletcher-Reeves in place of Møller's beta"
+    old = "trial_gradient @ (trial_gradient - gradient)"
+    new = "trial_gradient @ trial_gradient"
+
+The tests that should notice are few and quick; a change may have others than its file has. One that
+no test can notice, as nothing that anybody sees depends on it, has a `reason`.
 """
 
 from __future__ import annotations
@@ -59,5 +61,10 @@ class Change:
 
 def changes() -> list[Change]:
     """All changes of the lists."""
-    tables = [tomllib.loads(path.read_text(encoding="utf-8")) for path in LISTS]
-    return [Change(**entry) for table in tables for entry in table["change"]]
+    lists = [tomllib.loads(path.read_text(encoding="utf-8")) for path in LISTS]
+    return [
+        Change(file=file["path"], **{"tests": file["tests"], **entry})
+        for files in lists
+        for file in files["file"]
+        for entry in file["change"]
+    ]

@@ -24,6 +24,24 @@ def test_whitening_divides_each_direction_by_a_power_of_its_deviation(power):
     np.testing.assert_allclose(deviations, raw ** (1.0 - power), rtol=0.02)
 
 
+@pytest.mark.parametrize("power", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(("rank", "noise", "n"), [(4, 0.05, 400), (9, 0.0, 400), (5, 0.02, 60)])
+def test_a_feature_is_the_best_linear_estimate_from_its_direction_over_a_power(
+    rank, noise, n, power
+):
+    """Over the directions that show more than noise would; Φ Φᵀ has no signs."""
+    X = frames(n=n, rank=rank, noise=noise)
+    variances, directions = np.linalg.eigh(np.cov(X.T, bias=True))
+    of_noise, expected = np.median(variances), np.zeros((12, 12))
+    for variance, v in zip(variances, directions.T, strict=True):
+        if variance > of_noise * (1.0 + np.sqrt(12 / n)) ** 2:  # Marchenko and Pastur
+            signal = variance - of_noise
+            estimate = signal / (signal + of_noise + 1e-5 * variances[-1])
+            expected += np.outer(v, v) * (estimate / signal ** (power / 2.0)) ** 2
+    basis = whitening(X, power)
+    np.testing.assert_allclose(basis @ basis.T, expected, atol=1e-9 * np.abs(expected).max())
+
+
 def test_directions_of_noise_alone_are_left_out():
     X = frames(noise=0.01)
 

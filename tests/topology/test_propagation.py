@@ -145,6 +145,36 @@ def test_a_direction_of_three_hundredths_is_motion_and_one_of_three_thousandths_
     assert followed(0.003) < 0.2
 
 
+def test_the_path_term_is_a_tenth_of_the_path_laplacian_squared():
+    """Added to the energy of Algorithm 1, damped: W of one window of all frames, T times."""
+    take = one_window(0.1)
+    U, s, _ = np.linalg.svd(take.frames, full_matrices=False)
+    shares = s**2 / (s**2 + (0.01 * s[0]) ** 2)
+    W = np.eye(40) - 1 / 40 - (U * shares) @ U.T
+    L = np.eye(40) - (np.eye(40, k=1) + np.eye(40, k=-1)) / 2
+    L[0, 1] = L[-1, -2] = -1.0
+    B, free = 40 * W + 0.1 * L.T @ L, np.arange(1, 40, 2)
+    right = B[np.ix_(free, take.keys)] @ take.labels[:, 0]
+    expected = -np.linalg.solve(B[np.ix_(free, free)], right)
+    found = propagate(take, "path", width=81)
+    np.testing.assert_allclose(found[free, 0], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("method", "width", "dim"), [("framework", 15, 3), ("path", 15, 3), ("residual", 9, 5)]
+)
+def test_windows_are_of_15_frames_and_space_or_of_9_and_five_directions_of_whole_frames(
+    method, width, dim
+):
+    take, _ = performance()
+    noise = 0.05 * np.random.default_rng(0).normal(size=take.source.shape)
+    take = KeyedPerformance(take.source + noise, take.keys, take.labels)
+    found = propagate(take, method)
+    np.testing.assert_array_equal(found, propagate(take, method, width, dim))
+    assert np.abs(found - propagate(take, method, width - 2, dim)).max() > 1e-6
+    assert np.abs(found - propagate(take, method, width, dim - 1)).max() > 1e-6
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.01, 100.0), st.integers(0, 99))
 def test_the_source_is_turned_and_scaled_onto_a_similar_target(scale, seed):

@@ -110,6 +110,53 @@ def test_where_the_search_stays_the_likelihood_is_flat(nothing_but_likelihood, m
         assert abs(up - down) / 2e-5 < 0.02
 
 
+def expected_moments(search, data):
+    """E[z] and E[z zᵀ] of pairs, frames and poses: each conditioned on what it shows."""
+    now = search.factors
+    W = np.vstack([now.Wx, now.Wy])
+    noise = np.diag(np.r_[np.full(len(now.Wx), now.noise_x), now.noise_y])
+    mean = np.r_[np.zeros(len(now.Wx)), now.mean]
+    views = slice(None), slice(None, len(now.Wx)), slice(len(now.Wx), None)
+    rows = np.hstack([data.X, data.Y]), data.frames, data.poses
+    for view, shown in zip(views, rows, strict=True):
+        gain = np.linalg.solve(W[view] @ W[view].T + noise[view, view], W[view]).T
+        Z = (shown - mean[view]) @ gain.T
+        yield Z, Z.T @ Z + len(Z) * (np.eye(W.shape[1]) - gain @ W[view])
+
+
+def regressed(V, Z, squares, start):
+    """W of rows V, with a prior worth a fiftieth of them around the first W; what it leaves."""
+    k = 0.02 * len(V)
+    W = np.linalg.solve(squares + k * np.eye(len(squares)), (V.T @ Z + k * start).T).T
+    left = np.sum(V**2, axis=0) - 2.0 * np.sum(W * (V.T @ Z), axis=1)
+    return W, left + np.sum((W @ squares) * W, axis=1)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.3])
+def test_a_step_is_the_maximisation_with_its_priors_and_its_floors(noise):
+    """Ψ as if 20 poses more had shown the mean noise of all controls; both noises have a floor."""
+    data = Truth(d_x=8, d_y=5, q=3, noise=noise).data(12, 40, 25)
+    search = factor_analysis._Search(
+        data, factor_analysis._principal_factors(data, 0.5 * ridge_guess(data))
+    )
+    search.step()
+    (Z, of_pairs), (Z_frames, of_frames), (Z_poses, of_poses) = expected_moments(search, data)
+    before, start = search.factors, search.start
+    search.step()
+    X, Z_x = np.vstack([data.X, data.frames]), np.vstack([Z, Z_frames])
+    Wx, left_x = regressed(X, Z_x, of_pairs + of_frames, start.Wx)
+    Y, Z_y = np.vstack([data.Y, data.poses]), np.vstack([Z, Z_poses])
+    mean = (Y - Z_y @ before.Wy.T).mean(axis=0)
+    Wy, left_y = regressed(Y - mean, Z_y, of_pairs + of_poses, start.Wy)
+    found = search.factors
+    np.testing.assert_allclose(found.Wx, Wx, atol=1e-8)
+    np.testing.assert_allclose(found.Wy, Wy, atol=1e-8)
+    np.testing.assert_allclose(found.mean, mean, atol=1e-8)
+    assert found.noise_x == pytest.approx(max(left_x.sum() / X.size, 3e-5), rel=1e-6)
+    shrunk = (left_y + 20.0 * left_y.mean() / len(Y)) / (len(Y) + 20.0)
+    np.testing.assert_allclose(found.noise_y, np.maximum(shrunk, 1.5e-2), rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_unlabelled_data_tells_a_linear_map_from_few_labels_far_better_than_ridge(seed):
     truth = Truth(d_x=60, d_y=30, noise=0.3, seed=seed)

@@ -274,6 +274,12 @@ def test_the_step_from_frame_to_frame_is_found_through_noise(frames, sigma):
     assert estimated(noisy).sigma_t == pytest.approx(true, rel=0.2)
 
 
+def test_the_noise_of_two_frames_is_not_a_step():
+    rng = np.random.default_rng(0)
+    X = 0.3 * np.arange(4000.0)[:, None] * [1.0, 0.5, 0.0] + 0.2 * rng.normal(size=(4000, 3))
+    assert largest_step(X, 0.2) == pytest.approx(0.3, rel=0.05)
+
+
 def test_a_take_in_which_nothing_moves_is_refused():
     with pytest.raises(InputError, match="change"):
         estimated(np.ones((10, 6)))

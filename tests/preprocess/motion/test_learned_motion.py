@@ -7,7 +7,7 @@ from facert.preprocess.motion import motion as room
 from facert.preprocess.motion.motion import Motion, _rest
 from facert.preprocess.motion.smoothing import smooth_factors, smooth_series, transition
 
-SIGMA = 0.1
+SIGMA = 0.2
 
 
 def processes(frames, count, rate, rng):
