@@ -48,3 +48,15 @@ def test_vertices_that_no_face_uses_have_no_weight(sheet):
     plain, _ = laplacian.cotangent_matrix(points, faces)
     assert areas[0] == 0
     np.testing.assert_allclose(C.toarray()[1:, 1:], plain.toarray(), atol=1e-12)
+
+
+def test_cotangent_and_bending_energies_are_those_of_their_operators(sheet):
+    """L = diag(C)⁻¹ C in LᵀL; C M⁻¹ C times the mean area."""
+    points, faces = sheet
+    C, areas = laplacian.cotangent_matrix(points, faces)
+    C = C.toarray()
+    L = C / C.diagonal()[:, None]
+    energy = laplacian.cotangent_energy(points, faces).toarray()
+    np.testing.assert_allclose(energy, L.T @ L, atol=1e-12)
+    bending = laplacian.biharmonic_energy(points, faces).toarray()
+    np.testing.assert_allclose(bending, areas.mean() * C @ np.diag(1.0 / areas) @ C, atol=1e-12)

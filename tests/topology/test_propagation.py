@@ -101,6 +101,19 @@ def test_displacements_and_positions_are_one_problem_where_affine_maps_cost_noth
     np.testing.assert_allclose(propagate(take, "framework"), propagate(take, "literal"), atol=1e-6)
 
 
+@pytest.mark.parametrize("method", ["framework", "path", "residual", "laplacian"])
+def test_a_target_that_moves_as_the_scaled_source_does_is_found_however_little_a_window_shows(
+    method,
+):
+    """Displacements from it are the same throughout; the positions of (9) would stand still."""
+    take, _ = performance()
+    source = take.source * [1.0, 1.0, 1e-3]
+    truth = 2.5 * source + [1.0, 2.0, 3.0]
+    similar = KeyedPerformance(source, take.keys, truth[take.keys])
+    np.testing.assert_allclose(propagate(similar, method), truth, atol=1e-7)
+    assert np.abs(propagate(similar, "literal") - truth).max() > 1e-3
+
+
 def one_window(small, seed=0):
     """Frames that one window holds, and a control that is one of three motions.
 

@@ -105,3 +105,17 @@ def test_slow_ramps_that_follow_linearly_are_left_to_the_source():
     take, truth = ramp(1.0)
     found = np.linalg.norm(propagate(take) - truth) / np.linalg.norm(truth - truth.mean(axis=0))
     assert found < 1e-3
+
+
+def test_the_covariance_is_the_pseudo_inverse_of_the_stiffness_carried_to_all_frames():
+    path = SmoothPath(60, KEYS)
+    between_keys = np.linalg.pinv(path.stiffness, rcond=1e-12, hermitian=True)
+    expected = path.influence @ between_keys / between_keys.diagonal().mean()
+    np.testing.assert_allclose(path.covariance(), expected, atol=1e-9)
+
+
+def test_a_path_that_misses_a_fifth_of_what_a_map_misses_is_trusted_half():
+    assert trust_in_path(0.2 * 0.3, 0.3) == pytest.approx(MOST / 2)
+    assert trust_in_path(0.1 * 0.3, 0.3) == pytest.approx(MOST / (1 + 0.5**6))
+    assert trust_in_path(0.4 * 0.3, 0.3) == pytest.approx(MOST / (1 + 2.0**6))
+    assert MOST == 30.0
