@@ -56,7 +56,8 @@ UNITS = _by_word(
 
 _ROLES = _by_word(
     {
-        Role.RATE: "fps rate framerate delta dt latency delay duration exposure interval",
+        Role.RATE: "fps rate framerate delta dt latency delay duration exposure interval "
+        "process processing inference",
         Role.CONFIDENCE: "confidence conf score quality probability prob certainty reliability "
         "likelihood",
         Role.FLAG: "success successful succeeded tracked tracking valid validity detected "
@@ -66,7 +67,7 @@ _ROLES = _by_word(
         "datetime date pts utc ts recorded created",
         Role.FRAME: "frame frames",
         Role.COUNTER: "index idx row rows id ids uid seq sequence number num no nr count counter "
-        "unnamed packet record",
+        "unnamed packet record progress",
     }
 )
 _NUMBERS = _set("index idx id ids uid number num no nr count counter seq sequence")
@@ -75,7 +76,7 @@ _BESIDE = _set(
     "system capture captured video camera cam image img host local gmt posix world mono monotonic "
     "sensor recv received receive send sent server client arrival relative rel absolute abs since "
     "start code of in the per arkit mediapipe raw data app hw cpu gpu user person subject actor "
-    "tracker total process processing inference wall media hardware software recording "
+    "tracker total wall media hardware software recording "
     "at on sub overall mean average day"
 )
 # A name that ends so is no shape's, whatever stands in front.

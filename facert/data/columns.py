@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.data.column_names import Role, is_letter, names_face, role_of_name
+from facert.data.column_names import Role, is_letter, name_words, names_face, role_of_name
 from facert.data.names import fitting
 from facert.data.take import Source, Take
 from facert.data.text import plural
@@ -161,7 +161,7 @@ def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) ->
     absent = np.zeros(len(values), dtype=np.bool_)
     for column, role in roles.items():
         here = _rows_without(values[:, column], role)
-        if role_of_name(names[column]) is role and 0 < here.sum() < len(here):
+        if _states_absence(names[column], role) and 0 < here.sum() < len(here):
             log.info(
                 "%s without a face by %r: not observed",
                 plural(int((here & ~absent).sum()), "row"),
@@ -169,6 +169,15 @@ def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) ->
             )
             absent |= here
     return absent
+
+
+def _states_absence(name: str, role: Role) -> bool:
+    """Whether 0 of a flag or confidence of this name is known to mean that there was no face."""
+    found = {*name_words(name)}
+    if role is Role.CONFIDENCE:
+        return bool(found & {"confidence", "conf", "probability"})
+    vague = bool(found & {"status", "state"}) and not found & {"tracking", "tracked"}
+    return role_of_name(name) is role and not vague
 
 
 def _rows_without(column: FloatArray, role: Role) -> BoolArray:

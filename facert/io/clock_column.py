@@ -45,6 +45,7 @@ _USUAL_RATES, _RATES = (10.0, 250.0), (1.0, 250.0)
 _FASTEST = 1000.0
 _ENOUGH, _SHAPED = 5, 10  # rows that show a unit, and a clock without a name
 _REGULAR = 0.5  # of the usual step, by which most others differ at most
+_MOSTLY = 0.8  # of the steps of a clock are forward
 _LATE = 1e5  # seconds: a clock that begins later counts from elsewhere
 
 
@@ -149,7 +150,7 @@ def _is_usable(table: Table, column: int, fps: float | None) -> bool:
 
 def _mostly_rises(values: FloatArray) -> bool:
     up = np.diff(values) > 0
-    return bool(np.isfinite(values).all() and (not len(up) or up.mean() > 0.5))
+    return bool(np.isfinite(values).all() and (not len(up) or up.mean() > _MOSTLY))
 
 
 def _by_shape(table: Table) -> int | None:
@@ -203,10 +204,21 @@ def _number_clock(table: Table, column: int, sparse: bool) -> Clock:
     origin = 0.0 if plain else float(values[0])
     seconds = put_together((values - origin) * unit, table.numbers)
     if not plain:
-        log.info("%r is taken for %s; --in-fps overrules it", name, _UNITS[unit][0])
+        start = f", {origin:.10g} for 0" if origin else ""
+        log.info("%r is taken for %s%s; --in-fps overrules it", name, _UNITS[unit][0], start)
     if not sparse:
         _warn_of_rate(name, values, seconds)
     return Clock(seconds, nominal_rate(seconds), column, origin * unit)
+
+
+def in_seconds(name: str, values: FloatArray) -> FloatArray:
+    """Times (T,) in seconds, whatever unit their steps show; the log has another one."""
+    plain = values.ndim == 1 and bool(np.isfinite(values).all())
+    unit = _unit_by_step(values) if plain else 1.0
+    if unit == 1.0:
+        return values
+    log.info("%r is taken for %s; --in-fps overrules it", name, _UNITS[unit][0])
+    return np.asarray((values - values[0]) * unit)
 
 
 def _unit_by_size(values: FloatArray) -> float | None:

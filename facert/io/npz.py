@@ -30,6 +30,7 @@ from facert.data.rate import nominal_rate, standard_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, reading
+from facert.io.clock_column import in_seconds
 from facert.io.guarded import existing_file, parsing
 
 NO_TARGET = ""
@@ -217,12 +218,12 @@ def _choose(present: list[str], asked: str | None, option: str) -> str | None:
 
 def _clock(archive: Archive, frames: int, fps: float | None) -> tuple[FloatArray, float]:
     """Time of the frames, and the nominal rate."""
+    time = in_seconds("time", archive.numbers("time")) if "time" in archive else None
     if "fps" in archive:
         fps = standard_rate(archive.number("fps"))
-    elif "time" in archive:
-        fps = nominal_rate(archive.numbers("time"))
+    elif time is not None:
+        fps = nominal_rate(time)
     if not fps:
         fix = "Store fps, or run facert convert with --in-fps."
         raise InputError("fps", "the rate of the frames", "none", fix)
-    time = archive.numbers("time") if "time" in archive else np.arange(frames) / fps
-    return time, fps
+    return np.arange(frames) / fps if time is None else time, fps

@@ -391,6 +391,31 @@ def test_weights_of_an_archive_have_no_clock_among_them(tmp_path, caplog):
     assert read_take_file(path, keep=["timestamp_ms"]).source.values.shape == (FRAMES, 4)
 
 
+def test_milliseconds_of_an_archive_are_seconds(tmp_path, caplog):
+    path = tmp_path / "take.npz"
+    np.savez(path, weights=WEIGHTS, weight_names=NAMES, time=np.rint(1000 * SECONDS))
+    take = read_take_file(path)
+    assert take.fps == 30
+    np.testing.assert_allclose(take.time, SECONDS, atol=6e-4)
+    assert "'time' is taken for milliseconds" in caplog.text
+
+
+@pytest.mark.parametrize(("name", "hidden"), [("status", 0), ("score", 0), ("tracking_state", 7)])
+def test_zero_of_a_vague_flag_hides_nothing(path, name, hidden):
+    write(path, {"time": SECONDS, **weights(), name: [int(i >= 7) for i in range(FRAMES)]})
+    source = read_take_file(path).source
+    assert source.names == tuple(NAMES)
+    assert (~source.valid.all(axis=1)).sum() == hidden
+
+
+def test_times_that_are_no_clock_are_passed_over(path):
+    slow = {"time_of_inference_ms": 9 + WEIGHTS[:, 0], "recorded": WEIGHTS[:, 1]}
+    write(path, {**slow, "timestamp": SECONDS, **weights()})
+    take = read_take_file(path)
+    assert take.source.names == tuple(NAMES)
+    assert take.fps == 30
+
+
 def test_live_link_s_table_with_more_columns_has_its_weights_alone(path):
     codes = [f"00:00:01:{2 * i:02d}.000" for i in range(FRAMES)]
     values = rng.uniform(0.01, 1, size=(FRAMES, 52))

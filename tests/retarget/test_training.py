@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from facert.data.take import Source
 from facert.errors import InputError
-from facert.retarget.training import check_poses
+from facert.retarget.training import check_poses, train
+from facert.settings import Settings
 
 
 @pytest.fixture(name="predicted")
@@ -37,3 +39,14 @@ def test_a_few_predicted_poses_among_labels_are_warned_about(predicted, caplog) 
 
 def test_a_take_without_poses_has_nothing_to_check(predicted) -> None:
     check_poses(replace(predicted, params=None))
+
+
+def test_a_clock_among_the_weights_is_warned_of_once(make_take, caplog) -> None:
+    take = make_take()
+    weights = np.column_stack([take.source.matrix, 1000 * take.time])
+    names = [*(f"w{i}" for i in range(weights.shape[1] - 1)), "extra"]
+    train(replace(take, source=Source(weights, names), units=""), Settings(method="nearest"))
+    assert [r.getMessage() for r in caplog.records if "'extra' (a clock)" in r.getMessage()]
+    caplog.clear()
+    train(take, Settings(method="nearest"))
+    assert "no weights" not in caplog.text
