@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.rate import frames_at
+from facert.data.resampling import EVEN, PAUSE
 from facert.data.rig import Mesh, MeshSequence, Rig
 from facert.data.take import Source, Take
 
@@ -22,8 +24,9 @@ def facts_of(found: Take | Rig | MeshSequence) -> dict[str, Any]:
 
     ``constant`` channels never vary, ``still`` shapes move nothing; ``extents`` are width, height
     and depth of the neutral in its units; ``time_gaps`` counts the steps in time longer than one
-    and a half nominal frames; ``zeros`` counts marker positions that are exactly (0, 0, 0), which
-    is how some programs write a lost marker.
+    and a half nominal frames, of which ``longest_gap`` has the seconds; frames that are
+    ``evenly_spaced`` lie on the grid of their rate, whatever the gaps; ``zeros`` counts marker
+    positions that are exactly (0, 0, 0), which is how some programs write a lost marker.
     """
     if isinstance(found, MeshSequence):
         return _of_sequence(found)
@@ -45,7 +48,7 @@ def _of_take(take: Take) -> dict[str, Any]:
     return {
         "kind": "take",
         **_clock(take),
-        "time_gaps": int(np.sum(np.diff(take.time) > 1.5 / take.fps)),
+        **_spacing(take),
         "units": take.units,
         "up_axis": take.up_axis,
         "start_timecode": take.start_timecode,
@@ -58,6 +61,17 @@ def _of_take(take: Take) -> dict[str, Any]:
 def _clock(found: Take | MeshSequence) -> dict[str, Any]:
     seconds = float(found.time[-1] - found.time[0])
     return {"frames": len(found), "seconds": seconds, "fps": float(found.fps)}
+
+
+def _spacing(take: Take) -> dict[str, Any]:
+    """How the frames lie in time: evenly, but for gaps, or not."""
+    steps = np.diff(take.time)
+    gaps = steps[steps > PAUSE / take.fps]
+    return {
+        "evenly_spaced": frames_at(take.time, take.fps, EVEN) is not None,
+        "time_gaps": len(gaps),
+        "longest_gap": float(gaps.max()) if len(gaps) else None,
+    }
 
 
 def _size(mesh: Mesh) -> dict[str, Any]:

@@ -110,8 +110,12 @@ class Gaussian:
             return X, variance
         pull = _padded(np.where(hidden, 0.0, X - self.mean) @ self.precision)
         filled = _padded(np.where(hidden, self.mean, X))
+        unseen = np.asarray(
+            hidden.all(axis=1)
+        )  # of these frames nothing says more than the distribution
+        variance[unseen] = np.einsum("dm,dm->m", B, self.covariance @ B)
         P, B = self._padded_precision, np.vstack([B, np.zeros(B.shape[1])])
-        for rows, columns in _batches(hidden, B.shape[1]):
+        for rows, columns in _batches(hidden & ~unseen[:, None], B.shape[1]):
             sides = np.concatenate([pull[rows[:, None], columns][:, :, None], B[columns]], axis=2)
             solved = np.linalg.solve(_blocks(P, columns), sides)
             filled[rows[:, None], columns] -= solved[:, :, 0]
@@ -123,11 +127,12 @@ class Gaussian:
         """The conditional covariances P_hh⁻¹ of all frames, summed, (d, d)."""
         d, P = len(self.covariance), self._padded_precision
         total = np.zeros(P.size)
-        for _, columns in _batches(hidden):
+        unseen = np.asarray(hidden.all(axis=1))
+        for _, columns in _batches(hidden & ~unseen[:, None]):
             places = columns[:, :, None] * len(P) + columns[:, None, :]
             inverses = np.linalg.inv(_blocks(P, columns))
             total += np.bincount(places.ravel(), inverses.ravel(), minlength=P.size)
-        return total.reshape(P.shape)[:d, :d]
+        return np.asarray(total.reshape(P.shape)[:d, :d] + unseen.sum() * self.covariance)
 
     @cached_property
     def _padded_precision(self) -> FloatArray:
