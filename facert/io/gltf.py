@@ -137,11 +137,24 @@ def _document(path: Path) -> Document:
     root = parse_json_object(text)
     if not str(root["asset"]["version"]).startswith("2"):
         raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
-    if _DRACO in root.get("extensionsRequired", []):
+    if _needs_draco(root):
         fix = "Export it without Compression, or: npx gltf-pipeline -i IN.glb -o PLAIN.glb"
         raise InputError("extensionsRequired", "no Draco compression", _DRACO, fix)
     buffers = enumerate(root.get("buffers", []))
     return Document(root, [_buffer(one, path.parent, own, i) for i, one in buffers])
+
+
+def _needs_draco(root: dict[str, Any]) -> bool:
+    """Whether the file says so, or has no plain positions beside the compressed ones."""
+    packed = (
+        one["attributes"]["POSITION"]
+        for mesh in root.get("meshes", [])
+        for one in mesh["primitives"]
+        if _DRACO in one.get("extensions", {})
+    )
+    return _DRACO in root.get("extensionsRequired", []) or any(
+        "bufferView" not in root["accessors"][_index(accessor)] for accessor in packed
+    )
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
@@ -160,11 +173,11 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
 
 def _buffer(buffer: dict[str, Any], folder: Path, own: bytes | None, number: int) -> bytes:
     """Bytes of a buffer, from the file's own chunk, the URI, or a file beside it."""
+    if any(name in buffer.get("extensions", {}) for name in MESHOPT):
+        return b""  # for programs that cannot decompress: it may be absent
     uri = buffer.get("uri")
     if uri is None and number == 0 and own is not None:
         return own
-    if uri is None and any(name in buffer.get("extensions", {}) for name in MESHOPT):
-        return b""  # for programs that cannot decompress: left out, as it may be
     if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:
         try:
             return base64.b64decode(uri.partition(_EMBEDDED)[2], validate=True)

@@ -27,7 +27,7 @@ STILL = 0.1
 """So many vertices of a face stay near their place in an expression, as a share, at least."""
 NEAR = 0.05
 """What moves less, in widths of the face, is near its place."""
-BESIDE = 0.5
+BESIDE = 0.35
 """Farther off, in widths, is beside the neutral: shapes of the whole head move it less."""
 ALL_BESIDE = 0.02
 """As far off, if all shapes are by the same vector: it is the neutral that stands elsewhere."""
@@ -41,6 +41,9 @@ TORN = 0.05
 """Share of edges that are several times as long where the order of vertices differs."""
 _LONGER = 5.0
 _SEVERAL, _SAME = 3, 0.1
+SWAPPED = 0.3
+"""Share of the vertices that moved far onto the place of another one, where the order differs."""
+_EXACT = 1e-4
 _MIRROR = np.array([-1.0, 1.0, 1.0])
 _ROUNDS, _SHARP, _TINY = 20, 1e-3, 1e-300
 _SNAP_DEGREES, _SNAP_FACTOR = 5.0, 1.1
@@ -87,10 +90,10 @@ def registered(rig: Rig, align: bool) -> Rig:
     """The rig with a line in the log for each cause that shapes are out of register.
 
     With `align`, shapes are moved, turned and scaled back, and keep their expression. Where the
-    order of vertices differs, or the mesh is a mirror image, they stay as they are.
+    order of vertices differs, they stay as they are.
     """
     found = misfits(rig)
-    mended = [one for one in found if align and one.cause in ("beside", "scale", "turned")]
+    mended = [one for one in found if align and one.cause != "order"]
     if mended:
         shapes = rig.shapes.copy()
         for one in mended:
@@ -108,14 +111,15 @@ def _misfit(rig: Rig, shape: int, width: float, edges: IntArray) -> Misfit | Non
     neutral, moved = rig.neutral, rig.neutral + rig.shapes[shape]
     off = np.linalg.norm(rig.shapes[shape], axis=1)
     far = off > NEAR * width
+    swapped = _swapped(neutral, moved, far, width) > SWAPPED
     if np.mean(~far) >= STILL:
-        torn = _torn(neutral, moved, edges, far)
-        return Misfit(shape, "order", torn) if torn > TORN else None
+        other = swapped or _torn(neutral, moved, edges, far) > TORN
+        return Misfit(shape, "order", 1.0) if other else None
     factor, rotation, unlike = _similarity(neutral, moved)
     of_mirrored = _similarity(neutral * _MIRROR, moved)[2]
     if of_mirrored < min(UNLIKE, 0.5 * unlike):
         return Misfit(shape, "mirrored", 1.0)
-    if unlike > UNLIKE:
+    if swapped or unlike > UNLIKE:
         return Misfit(shape, "order", 1.0)
     if not 1 / SCALED < factor < SCALED:
         return Misfit(shape, "scale", factor)
@@ -149,8 +153,9 @@ def _undone(neutral: FloatArray, shape: FloatArray, cause: str) -> FloatArray:
     """
     moved = neutral + shape
     if cause != "beside":
-        factor, rotation, _ = _similarity(neutral, moved)
-        moved = moved @ rotation / factor
+        mirror = _MIRROR if cause == "mirrored" else np.ones(3)
+        factor, rotation, _ = _similarity(neutral * mirror, moved)
+        moved = moved @ rotation / factor * mirror
     return moved - np.median(moved - neutral, axis=0) - neutral
 
 
@@ -171,6 +176,14 @@ def _snapped_rotation(rotation: FloatArray) -> FloatArray:
 def _edges(faces: IntArray) -> IntArray:
     """Pairs of vertices that triangles join, once for each triangle, (3F, 2)."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _swapped(neutral: FloatArray, moved: FloatArray, far: BoolArray, width: float) -> float:
+    """Share of the vertices that moved far onto the exact place of another one that did so too."""
+    from scipy.spatial import cKDTree
+
+    distance, onto = map(np.asarray, cKDTree(neutral[far]).query(moved[far]))
+    return float(np.mean((distance < _EXACT * width) & (onto != np.arange(int(far.sum())))))
 
 
 def _torn(neutral: FloatArray, moved: FloatArray, edges: IntArray, far: BoolArray) -> float:
@@ -206,7 +219,7 @@ def _message(names: Sequence[str], found: Sequence[Misfit]) -> str:
         f"beside the neutral; {mend} moves it back",
         "scale": f"{are} {amount} times as large as the neutral: in another unit? {mend} scales it",
         "turned": f"{are} turned by {amount} degrees: another axis up? {mend} turns it back",
-        "mirrored": f"{are} a mirror image of the neutral: export it again with the same axes",
+        "mirrored": f"{are} a mirror image: two axes swapped? {mend} turns it back",
         "order": f"{are} torn apart: the vertices are in another order than the neutral's, or it "
         "is another mesh; no option mends that: export all from one mesh, in its order",
     }

@@ -210,6 +210,18 @@ def test_draco_is_refused_with_a_way_out(tmp_path: Path) -> None:
     assert "without Compression" in str(caught.value)
 
 
+def test_draco_that_is_not_declared_as_required_is_refused_all_the_same(tmp_path: Path) -> None:
+    builder = Builder()
+    builder.mesh(builder.accessor(HEAD, bufferView=None), {"jawOpen": JAW})
+    packed = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    builder.document.meshes[0].primitives[0].extensions = packed
+    path = builder.save(tmp_path / "face.glb")
+    with pytest.raises(InputError, match="no Draco compression"):
+        read_gltf_rig(path)
+    builder.document.accessors[0].bufferView = builder.view(HEAD)
+    np.testing.assert_array_equal(read_gltf_rig(builder.save(path)).neutral, HEAD)
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
 def test_damaged_streams_give_a_face_or_one_error(tmp_path_factory, changes) -> None:

@@ -50,6 +50,8 @@ MENDED = {
     "in inches": ("scale", lambda y: y * 39.37),
     "with z up": ("turned", lambda y: y @ QUARTER.T),
     "seen from behind": ("turned", lambda y: y * [-1, 1, -1]),
+    "with y and z swapped": ("mirrored", lambda y: y[:, [0, 2, 1]]),
+    "left for right": ("mirrored", lambda y: y * [-1, 1, 1]),
     "with z up in centimetres": ("scale", lambda y: 100 * y @ QUARTER.T + np.array([3, 2, 1])),
 }
 NOT_MENDED = {
@@ -59,7 +61,6 @@ NOT_MENDED = {
         lambda y: np.concatenate([y[:150], y[150:][RNG.permutation(75)]]),
     ),
     "another first vertex": ("order", lambda y: np.roll(y, 40, axis=0)),
-    "left for right": ("mirrored", lambda y: y * [-1, 1, 1]),
 }
 
 
@@ -120,6 +121,16 @@ def test_a_jaw_that_opens_as_far_as_a_small_mesh_is_wide_is_honest() -> None:
     opened = np.array([[0, -1.0, 0]] * 2 + [[0, 0, 0]] * 2)
     faces = np.array([[0, 1, 3], [0, 3, 2]])
     assert not misfits(Rig(lips, opened[None], ("jawOpen",), faces))
+
+
+def test_another_order_of_a_few_vertices_is_found_and_lips_that_meet_are_not() -> None:
+    face = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0.1], [1, 1, 0.1]])
+    faces = np.array([[0, 1, 3], [0, 3, 2]])
+    for order in ([3, 2, 1, 0], [1, 0, 2, 3], [2, 0, 3, 1]):
+        found = misfits(Rig(face, (face[order] - face)[None], ("smile",), faces))
+        assert [one.cause for one in found] == ["order"], order
+    closed = np.array([[0.0, 1, 0.1], [0, 1, 0.1], [0, 0, 0], [0, 0, 0]])
+    assert not misfits(Rig(face, closed[None], ("mouthClose",), faces))
 
 
 def test_shapes_that_move_a_whole_small_mesh_a_bit_are_honest() -> None:
