@@ -30,6 +30,7 @@ _KINDS = {"bs", "bsnode", "blend", "blendshape", "blendshapes", "ctl", "ctrl", "
 _KINDS |= {"controls", "curve", "expression", "expressions", "face", "geo", "geometry", "grp"}
 _KINDS |= {"head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes", "target"}
 _KINDS |= {"targets", "value", "weight", "weights"}
+_MOST_BEFORE, _MOST_AFTER = 16, 6  # Words that are removed: a path in a scene may be long
 _CARRIERS = ("head", "face")  # Of a mesh as of a part of the face
 
 
@@ -61,15 +62,19 @@ class Affix:
         assert span is not None  # it has it
         return composed(name)[: span.start], composed(name)[span.stop :]
 
+    def own_words(self, name: str) -> tuple[str, ...]:
+        """The words of a name without it; none where the name has it not, or nothing else."""
+        found = words(name)
+        begin, end = len(self.before), len(found) - len(self.after)
+        has = found[:begin] == self.before and found[max(end, 0) :] == self.after
+        return found[begin:end] if has else ()
+
     def _span(self, name: str) -> slice | None:
+        if not self.own_words(name):
+            return None
         found = parsed(name)
-        texts = tuple(word.text for word in found)
-        end = len(found) - len(self.after)
-        if end <= len(self.before):
-            return None
-        if texts[: len(self.before)] != self.before or texts[end:] != self.after:
-            return None
-        return slice(found[len(self.before)].begin, found[end - 1].end)
+        first, last = found[len(self.before)], found[len(found) - len(self.after) - 1]
+        return slice(first.begin, last.end)
 
 
 NONE = Affix()
@@ -97,8 +102,9 @@ def without_affix(names: Sequence[str]) -> tuple[str, ...]:
 def shared_affixes(names: Sequence[str], share: float = 1.0) -> list[Affix]:
     """All that at least so many of the names begin and end with, the longest first."""
     texts = [words(name) for name in names]
-    befores = _common(texts, share)
-    afters = [after[::-1] for after in _common([one[::-1] for one in texts], share)]
+    befores = _common(texts, share, _MOST_BEFORE)
+    turned = _common([one[::-1] for one in texts], share, _MOST_AFTER)
+    afters = [after[::-1] for after in turned]
     found = [Affix(before, after) for before in befores for after in afters]
     return sorted(filter(lambda affix: affix.words, found), key=lambda affix: -len(affix.words))
 
@@ -135,11 +141,11 @@ def is_foreign(affix: Affix) -> bool:
     )
 
 
-def _common(texts: Sequence[tuple[str, ...]], share: float) -> list[tuple[str, ...]]:
+def _common(texts: Sequence[tuple[str, ...]], share: float, most: int) -> list[tuple[str, ...]]:
     """What at least so many, above a half, begin with: nothing, and each time a word more."""
     found: list[tuple[str, ...]] = [()]
     having = list(texts)
-    while having:
+    while having and len(found) <= most:
         size = len(found[-1]) + 1
         longer = Counter(one[:size] for one in having if len(one) >= size)
         best, count = max(longer.items(), key=lambda item: item[1], default=((), 0))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from facert.data.affixes import NONE, Affix, is_foreign, is_namespace, shared_affixes
-from facert.data.spelling import SIDES, folded, is_number, joined, words
+from facert.data.spelling import SIDES, is_number, joined, words
 from facert.errors import InputError
 
 SHARED = 0.8
@@ -53,15 +53,18 @@ def find_alignment(
 
     With `halves`, a wanted name matches its left and right half, too.
 
-    Raises `InputError` naming `field` where two affixes would do and mean different names: those of
-    two subjects.
+    Raises `InputError` naming `field` where two affixes would do and mean different names, or some
+    names match as they are and others mean the same: those of two subjects.
     """
-    found = [one for one in _candidates(wanted, among, halves) if _holds(one, wanted, among)]
+    candidates = list(_candidates(wanted, among, halves))
+    found = [one for one in candidates if _holds(one, wanted, among)]
     if not found:
         return None
     best = max(found, key=_merit)
-    for other in found:
-        if len(other.pairs) >= NEARLY * len(best.pairs) and _differ(best.pairs, other.pairs):
+    as_they_are = [one for one in candidates if not one.of_wanted.words + one.of_among.words]
+    as_many = [one for one in found if len(one.pairs) >= NEARLY * len(best.pairs)]
+    for other in (*as_many, *as_they_are):
+        if _differ(best.pairs, other.pairs):
             raise _two_subjects(best, other, wanted, among, field)
     return best
 
@@ -109,9 +112,9 @@ def _without(affix: Affix, names: Sequence[str]) -> dict[str, int]:
     found: dict[str, int] = {}
     twice: set[str] = set()
     for index, name in enumerate(names):
-        core = affix.core(name) if affix.words else name
-        if core is not None:
-            key = folded(core)
+        own = affix.own_words(name)
+        if 0 < len(own) <= _MOST_WORDS:
+            key = joined(own)
             twice |= {key} & found.keys()
             found[key] = index
     return {key: index for key, index in found.items() if key not in twice}
@@ -197,18 +200,20 @@ def _two_subjects(
     one: Alignment, other: Alignment, wanted: Sequence[str], among: Sequence[str], field: str
 ) -> InputError:
     """An error that names both."""
-    place = next(iter(one.pairs.keys() & other.pairs.keys()), None)
+    shared = sorted(one.pairs.keys() & other.pairs.keys())
+    place = next((k for k in shared if one.pairs[k] != other.pairs[k]), None)
     if place is not None:
         examples = [among[min(found.pairs[place])] for found in (one, other)]
         affixes = [one.of_among, other.of_among]
     else:
         examples = [wanted[min(found.pairs)] for found in (one, other)]
         affixes = [one.of_wanted, other.of_wanted]
-    spelled = [affix.spelled(name) for affix, name in zip(affixes, examples, strict=True)]
-    first, second = map("*".join, spelled)
+    first, second = (
+        "*".join(affix.spelled(name)) if affix.words else name
+        for affix, name in zip(affixes, examples, strict=True)
+    )
+    line = f'Take one: facert convert --map, with a line such as "{first}" = "*".'
+    fix = line if all(affix.words for affix in affixes) else "Leave out one of them."
     return InputError(
-        field,
-        "the names of one subject",
-        f"those of two, {first!r} and {second!r}",
-        f'Take one: facert convert --map, with a line such as "{first}" = "*".',
+        field, "the names of one subject", f"those of two, {first!r} and {second!r}", fix
     )

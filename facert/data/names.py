@@ -141,16 +141,22 @@ class NameIndex:
         Raises `InputError` naming `field`, what holds `names`, when they are those of two subjects.
         """
         plain = cls(names)
-        look = plain.find_halves if halves else plain.find
-        found = sum(look(name) not in (None, []) for name in wanted)
+        found = plain._found(wanted, halves)
         if found >= NEARLY * min(len(wanted), len(names)):
             return plain
         aligned = find_alignment(wanted, names, field, halves)
-        if aligned is None or len(aligned.pairs) <= found:
+        index = cls(names, aligned)
+        if aligned is None or index._found(wanted, halves) <= found:
             return plain
         if not quiet:
             log.info("%s; if that is wrong, facert convert --map", aligned.text(wanted, names))
-        return cls(names, aligned)
+        return index
+
+    def _found(self, wanted: Sequence[str], halves: bool) -> int:
+        """The number of wanted names that are there."""
+        if halves:
+            return sum(bool(self.find_halves(name)) for name in wanted)
+        return sum(self.find(name) is not None for name in wanted)
 
     def find(self, name: str) -> int | None:
         """The position of `name`, or None."""

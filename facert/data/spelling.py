@@ -56,10 +56,12 @@ def composed(name: str) -> str:
 def parsed(name: str) -> tuple[Word, ...]:
     """The words of a name, with their places in `composed`."""
     name = composed(name)
-    spans = (found.span() for found in _WORD.finditer("".join(map(_outline, name))))
+    outline = name.translate(_ASCII) if name.isascii() else "".join(map(_outline, name))
+    spans = (found.span() for found in _WORD.finditer(outline))
     return tuple(Word(_same(name[begin:end]), begin, end) for begin, end in spans)
 
 
+@lru_cache(_KEPT)
 def words(name: str) -> tuple[str, ...]:
     """The words of a name, case folded, numbers with their sign, ``l`` and ``r`` written out."""
     return tuple(word.text for word in parsed(name))
@@ -132,3 +134,6 @@ def _outline(sign: str) -> str:
 def _same(word: str) -> str:
     word = composed(word.casefold())
     return _SHORT.get(word, word)
+
+
+_ASCII = {code: _outline(chr(code)) for code in range(128)}

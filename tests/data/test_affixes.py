@@ -1,7 +1,7 @@
 import unicodedata
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.affixes import without_affix
@@ -50,6 +50,7 @@ def test_words_of_the_names_themselves_stay(names):
     assert without_affix(names) == tuple(names)
 
 
+@settings(deadline=None)
 @given(st.lists(st.text(min_size=1), unique=True))
 def test_names_stay_as_many_and_different_whatever_they_are(names):
     assert len(set(without_affix(names))) == len(names)
@@ -58,6 +59,7 @@ def test_names_stay_as_many_and_different_whatever_they_are(names):
 FORMS = ("NFC", "NFD", "NFKC", "NFKD")
 
 
+@settings(deadline=None)
 @given(st.text(), st.sampled_from(FORMS))
 def test_forms_of_unicode_are_one_spelling(name, form):
     assert folded(unicodedata.normalize(form, name)) == folded(name)

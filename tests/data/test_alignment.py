@@ -7,7 +7,7 @@ import unicodedata
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.labelling import Poses, labelled, weights_as_poses
@@ -25,6 +25,7 @@ from facert.data.rig import Rig
 from facert.data.shared_controls import shared_controls
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
+from facert.preprocess.source_layout import SourceLayout
 
 FEW = ("jawOpen", "browInnerUp", "eyeBlink_L", "mouthSmileLeft", "cheekPuff", "browDown_R")
 PLACES = [ARKIT_SHAPES.index(name) for name in (
@@ -118,6 +119,7 @@ def test_subjects_of_markers():
     assert match(["LBRO"], ["Actor1:LBRO", "Actor1:RBRO"], "names").tolist() == [0]
 
 
+@settings(deadline=None)
 @given(st.lists(st.text(min_size=1), unique=True, min_size=1), st.sampled_from(["Face:", "a|b:"]))
 def test_a_namespace_never_hides_a_name_whatever_it_is(names, prefix):
     longer = spelled(names, prefix)
@@ -217,3 +219,20 @@ def test_lists_are_the_same_in_any_order_spelling_and_prefix():
     assert are_same(spelled(FEW[::-1], "Face:"), FEW)
     assert not are_same(FEW, FEW[1:])
     assert not are_same(("jawOpen", "JawOpen"), ("jawOpen", "mouthOpen"))
+
+
+def test_one_half_of_a_face_is_not_the_whole(caplog):
+    caplog.set_level(logging.INFO)
+    with pytest.raises(InputError, match="3 unknown in all"):
+        shape_drivers(["AU01_c", "AU02_c", "AU04_c"], ["AU01_r", "AU02_r", "AU04_r"])
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("own", ["", "Anna:"])
+def test_a_second_subject_never_stands_in_for_the_first(own):
+    both = spelled(FEW[:3], own) + spelled(FEW, "Ben:")
+    with pytest.raises(InputError, match=rf"those of two, 'Ben:\*' and '{own}jawOpen'"):
+        match(spelled(FEW, own), both, "/source/names")
+    columns = SourceLayout("weights", spelled(FEW, own)).columns
+    with pytest.raises(InputError, match="those of two"):
+        columns(both)
