@@ -15,7 +15,6 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rate import AGREES, frames_at, frames_shown, rate_shown, standard_rate
-from facert.data.rate import nominal_rate as nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.data.timecode import recounted

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.resampling import nominal_rate
+from facert.data.rate import AGREES, nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
@@ -135,8 +135,9 @@ def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:
         raise ValueError("keys that lie years apart")
     step = np.repeat(np.arange(len(steps)), frames.astype(np.int64))
     number = np.arange(len(step)) - np.repeat(np.cumsum(frames) - frames, frames.astype(np.int64))
-    between = time[step] + steps[step] * number / frames[step]
-    return np.append(between, time[-1]), rate
+    found = np.append(time[step] + steps[step] * number / frames[step], time[-1])
+    shown = nominal_rate(found)  # by all frames: a step alone is as rough as float32
+    return found, shown if abs(shown - rate) <= AGREES * rate else rate
 
 
 def _sampled(curves: _Curves, time: FloatArray) -> FloatArray:

@@ -78,7 +78,7 @@ FORMATS = (
         missing="marked",
         mark="livelink.bears_mark",
         reads="Live Link Face",
-        writes="poses (else source weights), if they are ARKit's",
+        writes="poses (else source weights), if they are ARKit's; rows are even in time",
     ),
     Format(
         (".csv",),
@@ -102,7 +102,7 @@ FORMATS = (
         about=" of Audio2Face or a tracker",
         reads="Audio2Face curves; frames of MediaPipe, BEAT and others: a list of objects, one a "
         "line, or columns",
-        writes="poses (else source weights)",
+        writes="poses (else source weights); rows are even in time",
     ),
     Format(
         (".txt",),

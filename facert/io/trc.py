@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.resampling import nominal_rate
+from facert.data.rate import BROKEN, nominal_rate, standard_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural, printable
 from facert.errors import InputError, reading
@@ -173,13 +173,13 @@ def _rate(facts: dict[str, str], time: FloatArray) -> float:
     """Frames a second as the header states it, unless the times of the frames contradict it."""
     shown = nominal_rate(time)
     try:
-        stated = float(facts["datarate"])
+        stated = standard_rate(float(facts["datarate"]))
     except (KeyError, ValueError):
         return shown
     if not math.isfinite(stated):
         return shown
     if not (np.diff(time) > 0).all() or _agrees(stated, shown, time):
-        return stated
+        return shown if shown in BROKEN else stated
     log.warning("DataRate is %g frames/s, the column Time %.4g: the column counts", stated, shown)
     return shown
 

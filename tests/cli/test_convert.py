@@ -225,3 +225,31 @@ def test_a_rig_has_no_frames(facert, tmp_path, option, value):
     np.testing.assert_allclose(
         read_rig_file(tmp_path / "rig.h5").neutral, [[100, 0, 0], [0, 0, -100], [0, 100, 0]]
     )
+
+
+def test_rows_of_json_are_as_many_as_moments(facert, tmp_path):
+    rows = [f"10:00:00:{2 * i:02d}.000,{1 if i < 8 or i > 12 else 0},0.5" for i in range(30)]
+    (tmp_path / "a.csv").write_text("\n".join([LIVELINK.split(",Mouth")[0], *rows]) + "\n")
+    done = facert("convert", tmp_path / "a.csv", tmp_path / "a.json")
+    assert done.code == 0
+    assert "5 missing frames: held" in done.err
+    assert read_take_file(tmp_path / "a.json").time.tolist() == [i / 30 for i in range(30)]
+    assert facert("convert", tmp_path / "a.csv", tmp_path / "b.h5", "--fps", "30").code == 0
+    take = read_take_file(tmp_path / "b.h5")
+    assert (len(take), int(take.source.valid.all(axis=1).sum())) == (30, 25)
+
+
+def test_the_rate_that_is_given_counts_for_a_recording_and_its_poses(facert, tmp_path):
+    rows = [f"00:00:{i:02d}:00.000,1,{i / 50}" for i in range(50)]
+    (tmp_path / "a.csv").write_text("\n".join([LIVELINK.split(",Mouth")[0], *rows]) + "\n")
+    (tmp_path / "p.csv").write_text("\n".join(["time,jaw", "0.16,1", "0.8,0", "1.32,1"]) + "\n")
+    done = facert("convert", tmp_path / "a.csv", tmp_path / "a.h5", "--in-fps", "25",
+                  "--poses", tmp_path / "p.csv")  # fmt: skip
+    assert done.code == 0, done.err
+    take = read_take_file(tmp_path / "a.h5")
+    assert (take.fps, take.time[-1], take.labels.tolist()) == (25.0, 1.96, [4, 20, 33])
+    table = tmp_path / "uneven.csv"
+    table.write_text("time,a\n" + "".join(f"{0.04 * i + 0.0004 * i * i},1\n" for i in range(30)))
+    refused = facert("convert", table, tmp_path / "b.h5", "--in-fps", "60")
+    assert refused.code == 3
+    assert "--in-fps" in refused.err

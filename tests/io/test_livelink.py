@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.names import ARKIT_NAMES, ARKIT_SHAPES
-from facert.data.resampling import nominal_rate
+from facert.data.rate import nominal_rate
 from facert.data.take import Controls, Source, Take
 from facert.data.timecode import format_timecode, parse_timecode, timecode
 from facert.errors import InputError

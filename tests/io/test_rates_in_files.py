@@ -166,13 +166,14 @@ def assert_there(played: np.ndarray, value: np.ndarray, clock: str) -> None:
 
 def test_a_blink_stays_at_its_second_in_a_glb(tmp_path: Path) -> None:
     rig = formats.Rig(np.eye(3), np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]))
-    for time in clocks().values():
+    for clock, time in clocks().items():
         settings = blinking(time)[:, None]
         path = tmp_path / "a.glb"
         formats.write("morphs", rig_morphs(rig, settings, time, 30.0), path, overwrite=True)
         back = formats.read_take_file(path)
         got = moments(back.time, back.source.values[:, 0])
         np.testing.assert_allclose(got, moments(time, settings[:, 0]) - time[0], atol=2e-3)
+        assert back.fps == {"ntsc": NTSC, "60": 60.0}.get(clock, back.fps)
 
 
 def test_poses_of_a_few_frames_are_not_held(tmp_path: Path) -> None:

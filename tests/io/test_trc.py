@@ -212,3 +212,11 @@ def test_a_marker_that_is_never_observed_keeps_its_columns(path: Path) -> None:
     take = read_trc(path)
     assert not take.source.valid[:, 0].any()
     np.testing.assert_array_equal(take.source.values[:, 1, 2], [1, 2, 3])
+
+
+@pytest.mark.parametrize("stated", ["29.97", "30", "29.970030"])
+def test_a_rate_of_television_is_kept(tmp_path: Path, stated: str) -> None:
+    path = tmp_path / "a.trc"
+    rows = "".join(f"{i + 1}\t{i * 1.001 / 30:.6f}\t1\t1\t1\n" for i in range(300))
+    path.write_text(f"PathFileType\t4\nDataRate\n{stated}\nFrame#\tTime\ta\n\n{rows}")
+    assert read_trc(path).fps == 30000 / 1001
