@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import BoolArray, FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Source, Take
+from facert.data.text import plural
 from facert.errors import InputError
-from facert.preprocess.faults import without_faults
+from facert.preprocess.faults import Reach, without_faults
 from facert.preprocess.motion.estimate import estimate_if_it_moves
 from facert.preprocess.neutral import Calibration, at_rest
 from facert.preprocess.source_layout import SourceLayout
@@ -110,6 +111,11 @@ def clean_source(
         rest = own.reshape(observed.values.shape[1:])
         X = Calibration.of(columns.pick(own), neutral, layout.kind).apply(X)
     measured = units.apply(X)
+    far = Reach.of(units, layout.kind).beyond(measured) if options.detect else None
+    if far is not None:
+        X, measured = np.where(far, np.nan, X), np.where(far, np.nan, measured)
+        source = source.with_matrix(np.where(far, np.nan, source.matrix))
+        _warn_of_far(far, layout)
     _check_distance(measured)
     found = estimate_if_it_moves(X, take.time, options.sigma) if options.smooth else None
     if found is None:
@@ -118,6 +124,19 @@ def clean_source(
     input_variance = np.where(np.isnan(X), found.std / units.scale, 0.0) ** 2
     clean = units.apply(found.frames)
     return CleanSource(source, rest, measured, clean, found.std, input_variance)
+
+
+def _warn_of_far(far: BoolArray, layout: SourceLayout) -> None:
+    """Warn of values (T, d_x) that are hidden, as nothing in training was so far away."""
+    columns = np.flatnonzero(far.any(axis=0))[:: layout.width] // layout.width
+    names = [layout.names[column] for column in columns]
+    frames = np.flatnonzero(far.any(axis=1))
+    log.warning(
+        "far beyond all that the training take showed, taken as not observed: %s, in %s from %d on",
+        ", ".join(names),
+        plural(len(frames), "frame"),
+        frames[0],
+    )
 
 
 def _check_distance(frames: FloatArray) -> None:

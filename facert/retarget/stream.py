@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -11,13 +12,15 @@ from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.methods.base import Prediction
 from facert.preprocess.clean_source import ABSURD
-from facert.preprocess.faults import FaultDetector
+from facert.preprocess.faults import FaultDetector, Reach
 from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import SourceColumns
 from facert.retarget.model import TrainedModel
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
+
+log = logging.getLogger("facert")
 
 Details = Callable[[], tuple[FloatArray | None, FloatArray]]
 """Works out the standard deviation of a pose, and the cleaned source."""
@@ -97,6 +100,8 @@ class RetargetStream:
         self._shape = (count, 3) if markers else (count,)
         self._cleaned_shape = (-1, 3) if markers else (-1,)
         self._watch = FaultDetector(count) if options.detect and markers else None
+        self._reach = Reach.of(model.source_units, model.layout.kind) if options.detect else None
+        self._far: set[str] = set()  # names that the log has warned of
         self._new_filter = partial(_filter, model, fps, options)
         self._filter = self._new_filter()
         self._noise: float | None = None
@@ -154,7 +159,7 @@ class RetargetStream:
         row, seen = self._observed(values)
         if self._calibration is not None:
             row = self._calibration.apply(row)
-        frame = self._model.source_units.apply(row)
+        frame, seen = self._within_reach(self._model.source_units.apply(row), seen)
         if (np.abs(frame) > ABSURD).any():  # never where NaN
             expected, found = "positions near those of the training take", "others, far away"
             raise InputError("the frame", expected, found, "Skip it; check units and origin.")
@@ -188,6 +193,21 @@ class RetargetStream:
             hidden = np.repeat(hidden.reshape(-1, 3).any(axis=1), 3)
             row[hidden] = np.nan
         return row, ~hidden
+
+    def _within_reach(self, frame: FloatArray, seen: Seen) -> tuple[FloatArray, Seen]:
+        """A normalised frame without what is far beyond training, and what it shows then."""
+        far = None if self._reach is None else self._reach.beyond(frame[None])
+        if far is None:
+            return frame, seen
+        layout = self._model.layout
+        for index in np.flatnonzero(far[0, :: layout.width]):
+            name = layout.names[index]
+            if name not in self._far:
+                self._far.add(name)
+                text = "%s is far beyond all that the training take showed: taken as not observed"
+                log.warning(text, name)
+        frame = np.where(far[0], np.nan, frame)
+        return frame, ~np.isnan(frame)
 
     def _cleaned(self, frame: FloatArray, seen: Seen) -> tuple[FloatArray, FloatArray | None]:
         """The frame without noise, (d_x,), and the variance of what it did not show, (1, d_x)."""

@@ -30,6 +30,7 @@ from __future__ import annotations
 from facert.preprocess.faults.detector import HELD, FaultDetector
 from facert.preprocess.faults.held import held_values
 from facert.preprocess.faults.kinds import Faults
+from facert.preprocess.faults.reach import Reach
 from facert.preprocess.faults.search import find_faults, without_faults
 from facert.preprocess.faults.spiked import single_spikes
 from facert.preprocess.faults.strayed import far_from_expected
@@ -39,6 +40,7 @@ __all__ = [
     "HELD",
     "FaultDetector",
     "Faults",
+    "Reach",
     "exchanged",
     "far_from_expected",
     "find_faults",
