@@ -32,6 +32,15 @@ def test_curves_are_read_as_they_were_written(tmp_path: Path, ending: str) -> No
     np.testing.assert_allclose(curves.time, TAKE.time)
 
 
+def test_a_table_that_states_its_columns_is_read_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "curves.csv"
+    write_take_file(Take([0.0, 0.1], Source([[1.0, 2.0], [3.0, 4.0]], ("frame", "time"))), path)
+    assert path.read_text().startswith('"time (weights)",frame,time\n')
+    curves = read_curves(str(path))
+    assert curves.values == {"frame": [1.0, 3.0], "time": [2.0, 4.0]}
+    assert curves.time == [0.0, 0.1]
+
+
 def test_what_is_not_known_gets_no_key_and_a_constant_curve_one(tmp_path: Path) -> None:
     write_curves(TAKE, tmp_path / "curves.json")
     curves = read_curves(str(tmp_path / "curves.json"))
