@@ -146,3 +146,11 @@ def test_real_markers_come_out_as_those_that_others_stabilised(real_data, name):
     assert left < 0.02 * truth.std(axis=0).max()
     automatic = off(stabilise(raw).take.source.values, truth)
     assert automatic < 0.7 * off(raw.source.values, truth)
+
+
+def test_a_marker_that_strays_in_a_few_frames_is_as_stable_as_before(face):
+    """In fewer than the twentieth that does not count at either end."""
+    strayed, rng = face.copy(), np.random.default_rng(0)
+    for marker in (1, 4, 6):
+        strayed[rng.permutation(400)[:8], marker] += 5.0
+    assert set(stable_markers(strayed)) <= set(range(8))

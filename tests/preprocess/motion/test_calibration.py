@@ -5,6 +5,7 @@ import pytest
 
 from facert.data.arrays import rms
 from facert.preprocess.motion.estimate import RANGE, error_of_filling, estimate
+from facert.preprocess.motion.motion import Motion
 
 FRAMES, COLUMNS = 400, 24
 
@@ -69,3 +70,17 @@ def test_a_column_that_its_gaps_and_their_echo_would_hide_throughout_is_left_as_
     given, _ = hide(moving())
     given[: FRAMES // 2, :3] = np.nan  # half a take later is the other half
     assert np.isfinite(error_of_filling(given, 0.001, 1.0 / 30.0))
+
+
+def test_the_ratio_is_that_of_errors_where_gaps_are_made_once_more_half_a_take_later(monkeypatch):
+    """To the standard deviation there, by a motion that does not know; without the noise."""
+    monkeypatch.setattr("facert.preprocess.motion.motion.FACTORS", 4)
+    noise = 0.05
+    truth = moving(own=1.0)
+    X, hidden = hide(truth + noise * np.random.default_rng(2).normal(size=truth.shape))
+    again = np.roll(hidden, FRAMES // 2, axis=0) & ~hidden
+    given = np.where(again, np.nan, X)
+    mean, variance = Motion.learned(given, noise).smooth(given, noise)
+    ratio = np.sqrt((rms((mean - X)[again]) ** 2 - noise**2) / variance[again].mean())
+    assert ratio > 1.3
+    assert error_of_filling(X, noise, 1.0) == pytest.approx(ratio)
