@@ -92,7 +92,9 @@ JOBS = Annotated[
         show_default="1",
     ),
 ]
-OVERWRITE = Annotated[bool, file_option("Replace existing output files.", "--overwrite")]
+OVERWRITE = Annotated[
+    bool, file_option("Replace output files that exist, if facert wrote them.", "--overwrite")
+]
 
 
 def numbers(text: str, option: str) -> list[int]:
