@@ -6,6 +6,8 @@ import logging
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from facert.data.columns import warn_of_clocks
 from facert.data.labelling import predicted_poses
 from facert.data.normalisation import Normalisation
@@ -14,6 +16,7 @@ from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
 from facert.models.optim.monitor import Monitor
+from facert.preprocess.faults.quantiles import median
 from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.preparation import TrainingData, training_data
 from facert.regions.learning import Learned, StartingModel, learn
@@ -21,6 +24,10 @@ from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
 log = logging.getLogger("facert")
+
+ABSURD, LARGE, NAMED = 20.0, 0.75, 5
+"""A value of a label is absurd that is so many times as large as this quantile of a control; so
+many are named."""
 
 
 def train(
@@ -55,6 +62,7 @@ def train(
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
     require_known(settings)
     check_poses(take)
+    _warn_of_absurd_poses(take)
     warn_of_clocks(take)
     data = training_data(take, settings)
     begin_at = None if start is None else _start(start, data)
@@ -99,6 +107,25 @@ def check_poses(take: Take) -> None:
     if predicted:
         poses = plural(predicted, "pose")
         log.warning("%s with a standard deviation: predicted, and learned from as labels", poses)
+
+
+def _warn_of_absurd_poses(take: Take) -> None:
+    """Warn of values among the labels that are many times larger than all that is like them."""
+    if take.params is None or take.controls is None or not len(take.labels):
+        return
+    sizes = np.abs(take.params[take.labels])
+    large = np.quantile(sizes, LARGE, axis=0)
+    usual = float(np.median(large[large > 0.0])) if large.any() else 0.0
+    own = np.nan_to_num(median(np.where(sizes > 0.0, sizes, np.nan).T))
+    own = np.where((sizes > 0.0).sum(axis=0) > 1, own, 0.0)  # one alone is like none
+    for row, control in np.argwhere(sizes > ABSURD * np.maximum(usual, own))[:NAMED].tolist():
+        log.warning(
+            "the pose of frame %d has %s at %.3g, many times as much as other poses and controls:"
+            " correct it if it is a slip",
+            take.labels[row],
+            take.controls.names[control],
+            take.params[take.labels[row], control],
+        )
 
 
 def _start(start: Retargeter, data: TrainingData) -> StartingModel:

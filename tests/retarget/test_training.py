@@ -50,3 +50,15 @@ def test_a_clock_among_the_weights_is_warned_of_once(make_take, caplog) -> None:
     caplog.clear()
     train(take, Settings(method="nearest"))
     assert "no weights" not in caplog.text
+
+
+@pytest.mark.parametrize("value", [1e9, -1e30, 400.0])
+def test_an_absurd_value_of_a_label_is_named_with_frame_and_control(make_take, value, caplog):
+    take = make_take(frames=60, posed=12, animation=0)
+    train(take, Settings(method="nearest"))
+    assert "many times" not in caplog.text
+    frame, params = take.labels[3], take.params.copy()
+    params[frame, 1] = value
+    train(replace(take, params=params), Settings(method="nearest"))
+    name = take.controls.names[1]
+    assert f"the pose of frame {frame} has {name} at {value:.3g}" in caplog.text
