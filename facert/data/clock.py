@@ -19,6 +19,9 @@ log = logging.getLogger("facert")
 ORDINARY = 1.5
 """A step of so many usual ones is an ordinary step, at most."""
 
+HOUR = 3600.0
+
+_MISSING = 60.0  # seconds without rows, where a clock was set back by whole hours
 _AROUND = 15  # rows on either side that show how the clock goes there
 _ENOUGH = 3  # rows that go on after a step back
 _FEW, _RARE = 5, 0.02  # steps back, and their share of the rows: more are no clock that was set
@@ -63,7 +66,7 @@ def put_together(seconds: FloatArray, values: FloatArray) -> FloatArray:
     for row, end in zip(backs.tolist(), ends.tolist(), strict=True):
         if not _was_set(together, values, row, end, usual):
             continue
-        size = float(together[:row].max()) + usual - together[row]
+        size = _size(float(together[:row].max()) + usual - together[row])
         together[row:] += size
         sizes.append((size, row + 1))
     for size, number in sizes[:_LOGGED]:
@@ -71,6 +74,12 @@ def put_together(seconds: FloatArray, values: FloatArray) -> FloatArray:
     if len(sizes) > _LOGGED:
         log.warning("the clock steps back %d times more: put together", len(sizes) - _LOGGED)
     return together
+
+
+def _size(size: float) -> float:
+    """How far a clock was set back: whole hours where rows missing there account for the rest."""
+    hours = HOUR * np.ceil(size / HOUR)
+    return hours if hours - size < _MISSING else size
 
 
 def _was_set(seconds: FloatArray, values: FloatArray, row: int, end: int, usual: float) -> bool:

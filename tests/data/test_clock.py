@@ -45,7 +45,13 @@ def test_a_whole_hour_of_frames_goes_on(caplog) -> None:
     np.testing.assert_allclose(time, true)
 
 
-ORDER = list(range(40))
+@pytest.mark.parametrize("hours", [1, 2])
+def test_rows_that_are_missing_where_an_hour_is_set_back_stay_so(hours, caplog) -> None:
+    true = np.delete(9000 + np.arange(180) * STEP, range(80, 100))
+    clock = true - 3600 * hours * (np.arange(160) >= 80)
+    _, time = rising(clock, noise(160))
+    np.testing.assert_allclose(time, true, atol=1e-9)
+    assert f"back by {3600 * hours} s at row 81" in caplog.text
 
 
 @pytest.mark.parametrize(
