@@ -27,7 +27,9 @@ from facert.io.table_take import Reading, listed, take_of_table
 log = logging.getLogger("facert")
 
 _AXES = frozenset(("x", "y", "z", "w", "pitch", "yaw", "roll", "rx", "ry", "rz"))
-_OWN = re.compile(r'\{"exportFps": [^,]*, "trackPath": "", "startTimecode": ')
+_OWN = re.compile(
+    r'\{("createdBy": "[^"]*", )?"exportFps": [^,]*, "trackPath": "", "startTimecode": '
+)
 _HEAD = 256
 _LARGE, _SPARSE = 2**20, 20  # cells; of such a table one in so many must be filled
 

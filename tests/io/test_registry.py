@@ -21,7 +21,7 @@ def test_every_function_of_a_format_is_there(one) -> None:
 def test_endings_are_those_of_a_kind() -> None:
     assert endings("write", "take") == (".h5", ".hdf5", ".livelink.csv", ".csv", ".json")
     assert endings("read", "mesh") == (".glb", ".gltf", ".obj", ".ply")
-    assert ".csv of Live Link Face or plain, .json of Audio2Face" in listed("read", "take")
+    assert ".csv of Live Link Face, another tracker or plain, .json of" in listed("read", "take")
 
 
 def test_one_declaration_brings_a_format_into_all_lists(tmp_path, monkeypatch) -> None:
