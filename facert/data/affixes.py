@@ -32,6 +32,21 @@ _KINDS |= {"head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes",
 _KINDS |= {"targets", "value", "weight", "weights"}
 _MOST_BEFORE, _MOST_AFTER = 16, 6  # Words that are removed: a path in a scene may be long
 _CARRIERS = ("head", "face")  # Of a mesh as of a part of the face
+_PLACES = {"upper", "lower", "up", "down", "inner", "outer", "in", "out", "top", "bottom"}
+_PLACES |= {
+    "front",
+    "back",
+    "c",
+    "center",
+    "centre",
+    "mid",
+    "middle",
+    "lf",
+    "lft",
+    "lt",
+    "rt",
+    "rgt",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +65,11 @@ class Affix:
     def is_kind(self) -> bool:
         """Whether it means a kind of node, or counts them, as far as its words are known."""
         return all(word in _KINDS or is_number(word) for word in self.words)
+
+    @property
+    def tells_apart(self) -> bool:
+        """Whether it says a side or a place, by which the names of one face are told apart."""
+        return any(word in SIDES or word in _PLACES for word in self.words)
 
     def core(self, name: str) -> str | None:
         """The name without it; None where the name has it not, or nothing else."""
@@ -135,10 +155,9 @@ def is_namespace(affix: Affix, name: str) -> bool:
 
 
 def is_foreign(affix: Affix) -> bool:
-    """Whether an affix shows neither a side nor a part of the face, as its own words would."""
-    return not any(
-        word in SIDES or (part_of(word) != OTHER and word not in _CARRIERS) for word in affix.words
-    )
+    """Whether an affix shows neither a place nor a part of the face, as its own words would."""
+    facial = any(part_of(word) != OTHER and word not in _CARRIERS for word in affix.words)
+    return not facial and not affix.tells_apart
 
 
 def _common(texts: Sequence[tuple[str, ...]], share: float, most: int) -> list[tuple[str, ...]]:

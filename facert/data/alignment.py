@@ -156,10 +156,11 @@ class _Removed:
 
     @property
     def is_word(self) -> bool:
-        """Whether it, or what remains without it, says a side or a number and no more."""
+        """Whether it tells names of one face apart, or what remains without it is but a number."""
+        if self.is_named:
+            return any(word in SIDES for word in self.affix.words)
         cores = filter(None, map(self.affix.core, self.met))
-        sided = any(word in SIDES for word in self.affix.words)
-        return sided or (not self.is_named and all(map(_is_bare, cores)))
+        return self.affix.tells_apart or all(map(_is_bare, cores))
 
 
 def _holds(found: Alignment, wanted: Sequence[str], among: Sequence[str]) -> bool:
@@ -170,11 +171,23 @@ def _holds(found: Alignment, wanted: Sequence[str], among: Sequence[str]) -> boo
     removed = [one for one in both if one.affix.words]
     if not removed or any(one.is_word for one in removed):
         return False
-    if len(removed) > 1 and not all(one.is_named or is_foreign(one.affix) for one in removed):
+    if len(removed) > 1 and not _are_exchanged(removed):
         return False
     own, count = all(one.is_own for one in removed), len(found.pairs)
     share = MOST if own else NEARLY
     return (own or count >= _ENOUGH) and count >= share * min(len(wanted), len(among))
+
+
+def _are_exchanged(removed: Sequence[_Removed]) -> bool:
+    """Whether affixes of the two lists say nothing of the face, so that they need not agree.
+
+    Of two suffixes that is known of kinds only: ``.tx`` and ``.ty``, or ``_min`` and ``_max``, tell
+    two controls apart.
+    """
+    suffixes = [Affix(after=one.affix.after) for one in removed if one.affix.after]
+    if len(suffixes) > 1 and not all(suffix.is_kind for suffix in suffixes):
+        return False
+    return all(one.is_named or is_foreign(one.affix) for one in removed)
 
 
 def _is_bare(core: str) -> bool:

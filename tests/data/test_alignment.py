@@ -71,6 +71,14 @@ def test_an_affix_of_either_list_is_seen_through_and_logged(prefix, suffix, capl
         (["smile"], ["smileWide"]),
         (["open", "shut", "wide"], ["jaw_open", "brow_shut", "lip_wide"]),
         (["jawOpen", "mouthPucker"], ["JawOpen", "mouthFunnel"]),
+        (["upperLip0", "upperLip1", "upperLip2"], ["lowerLip0", "lowerLip1", "lowerLip2"]),
+        (["inner_1a", "inner_1b", "inner_1c"], ["outer_1a", "outer_1b", "outer_1c"]),
+        (["smile", "frown", "blink"], ["lower_smile", "lower_frown", "lower_blink"]),
+        (["lf_blink", "lf_smile", "lf_frown"], ["rt_blink", "rt_smile", "rt_frown"]),
+        (["jaw.tx", "lip.tx", "brow.tx"], ["jaw.ty", "lip.ty", "brow.ty"]),
+        (["jaw_pos", "lip_pos", "brow_pos"], ["jaw_neg", "lip_neg", "brow_neg"]),
+        (["jaw_min", "lip_min", "brow_min"], ["jaw_max", "lip_max", "brow_max"]),
+        (["AU01", "AU02", "AU04"], ["AU01_r", "AU02_r", "AU04_r", "AU01_c", "AU02_c", "AU04_c"]),
     ],
 )
 def test_words_of_a_name_are_no_affix(wanted, among):
