@@ -50,14 +50,14 @@ class InputError(FacertError):
         field, expected, found = map(_shortened, (self.field, self.expected, self.found))
         fix = _shortened(self.fix, 10 * MOST)  # it may list what there is
         line = f"{where}{field}: expected {expected}, found {found}. {fix}"
-        return _printable(" ".join(line.split()))
+        return escaped(" ".join(line.split()))
 
 
 def _shortened(text: str, most: int = MOST) -> str:
     return text if len(text) <= most else f"{text[:most]}[...]"
 
 
-def _printable(text: str) -> str:
+def escaped(text: str) -> str:
     """The text with escapes for what would upset a terminal."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
 
@@ -88,7 +88,7 @@ class OutputExistsError(FacertError):
 
     def __str__(self) -> str:
         """One line: ``path: problem. Fix.``."""
-        return _printable(f"{self.path}: {self.problem}. {self.fix}")
+        return escaped(f"{self.path}: {self.problem}. {self.fix}")
 
 
 class OutputKeptError(OutputExistsError):

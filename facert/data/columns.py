@@ -16,7 +16,7 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.column_names import Role, is_letter, name_words, names_face, role_of_name
 from facert.data.names import fitting
 from facert.data.take import Source, Take
-from facert.data.text import plural
+from facert.data.text import listed, plural
 from facert.errors import InputError
 
 log = logging.getLogger("facert")
@@ -150,10 +150,9 @@ def _is_two_valued(column: FloatArray) -> bool:
 def _log_left_out(names: Sequence[str], roles: dict[int, Role]) -> None:
     if not roles:
         return
-    listed = [f"{names[column]!r} ({role.value})" for column, role in roles.items()]
-    more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
-    text = "left out, as no weights: %s%s; facert convert --keep NAME keeps one"
-    log.info(text, ", ".join(listed[:_LISTED]), more)
+    columns = [f"{names[column]!r} ({role.value})" for column, role in roles.items()]
+    text = "left out, as no weights: %s; facert convert --keep NAME keeps one"
+    log.info(text, listed(columns, _LISTED))
 
 
 def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) -> BoolArray:
@@ -234,8 +233,8 @@ def warn_of_clocks(take: Take) -> None:
         roles = roles_of(names, take.params[labels], take.time[labels], sparse=True)
         found |= {names[column]: role for column, role in roles.items()}
     if found:
-        listed = ", ".join(f"{name!r} ({role.value})" for name, role in found.items())
-        log.warning("learned from, though by name or shape no weights: %s", listed)
+        text = ", ".join(f"{name!r} ({role.value})" for name, role in found.items())
+        log.warning("learned from, though by name or shape no weights: %s", text)
 
 
 def _copies(column: FloatArray, time: FloatArray, rows: int = ENOUGH) -> bool:

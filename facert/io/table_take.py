@@ -19,7 +19,7 @@ from facert.data.columns import Weights, require_there, weight_columns
 from facert.data.names import ARKIT_NAMES, canonical, fitting
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take
-from facert.data.text import plural
+from facert.data.text import listed, plural
 from facert.errors import InputError
 from facert.io.clock_column import Clock, clock_of
 from facert.io.coordinates import Markers, markers_among
@@ -31,7 +31,6 @@ _UNIT = re.compile(r"AU\d\d_r")
 _FEWEST_UNITS = 3
 _FEWEST_SHAPES = 10
 _FEW = 0.1  # of the rows, which a clock may repeat
-_LISTED = 6
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ def _log_texts(table: Table, texts: Sequence[int], numbers: Sequence[int]) -> No
         row = next(row for row, cell in enumerate(cells) if cell)
         raise table.error(row, texts[0], "a number", repr(cells[row][:40]))
     if texts:
-        log.info("left out, as text: %s", listed([table.names[column] for column in texts]))
+        log.info("left out, as text: %s", listed([repr(table.names[column]) for column in texts]))
 
 
 def _of_mediapipe(names: Sequence[str], columns: Sequence[int]) -> list[int]:
@@ -173,7 +172,7 @@ def _of_openface(names: Sequence[str], columns: Sequence[int]) -> list[int]:
         log.info(
             text + "of X_0, Y_0, Z_0 ... alone is one of markers",
             plural(len(units), "action unit"),
-            listed(rest),
+            listed(list(map(repr, rest))),
         )
     return units + flags
 
@@ -223,9 +222,3 @@ def arkit_names(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(names)
     log.info("%r and others are ARKit's names with more around them: named as ARKit does", names[0])
     return own
-
-
-def listed(names: Sequence[str]) -> str:
-    """The first of some names, for the log."""
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return ", ".join(map(repr, names[:_LISTED])) + more

@@ -17,12 +17,13 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.column_names import names_face, role_of_name
 from facert.data.take import Take
+from facert.data.text import listed
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
 from facert.io.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
 from facert.io.table import Table
-from facert.io.table_take import Reading, listed, take_of_table
+from facert.io.table_take import Reading, take_of_table
 
 log = logging.getLogger("facert")
 
@@ -105,7 +106,7 @@ def _weights(frames: Sequence[Frame]) -> list[str]:
     used = main + facial
     left_out = {key for frame in frames for key in (*frame.groups, *frame.others)} - set(used)
     if left_out:
-        log.info("left out, as no weights: %s", listed(sorted(left_out)))
+        log.info("left out, as no weights: %s", listed(sorted(map(repr, left_out))))
     return used
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from facert.data.alignment import NEARLY, Alignment
 from facert.data.arrays import IntArray
 from facert.data.names import NameIndex
-from facert.data.text import listed, plural
+from facert.data.text import listed, plural, printable
 from facert.errors import InputError
 
 log = logging.getLogger("facert")
@@ -104,8 +104,9 @@ class StreamNames:
             if first < 0:
                 self.rows[place] = row
             elif first != row and not self._warned:
-                both = [f"{path}/{name}" for path, name in self._rows]
-                log.warning("%s and %s are one name: the first counts", both[first], both[row])
+                both = [f"{path}/{name}" if path else name for path, name in self._rows]
+                text = "%s and %s are one name: the first counts"
+                log.warning(text, printable(both[first]), printable(both[row]))
                 self._warned = True
         return None not in places
 

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Rig
-from facert.data.text import printable
+from facert.data.text import listed
 from facert.mesh.rigid import align
 
 log = logging.getLogger("facert")
@@ -48,7 +48,6 @@ _MIRROR = np.array([-1.0, 1.0, 1.0])
 _ROUNDS, _SHARP, _TINY = 20, 1e-3, 1e-300
 _SNAP_DEGREES, _SNAP_FACTOR = 5.0, 1.1
 _FACTORS = np.array([1.0, 10.0, 100.0, 1000.0, 12.0, 2.54, 30.48, 3.2808, 39.37])
-_MOST_NAMES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ def registered(rig: Rig, align: bool) -> Rig:
         shapes = rig.shapes.copy()
         for one in mended:
             shapes[one.shape] = _undone(rig.neutral, rig.shapes[one.shape], one.cause)
-        names = _listed([rig.names[one.shape] for one in mended])
+        names = listed([rig.names[one.shape] for one in mended])
         log.info("moved into register with the neutral: %s", names)
         rig = replace(rig, shapes=shapes)
     left = [one for one in found if one not in mended]
@@ -209,7 +208,7 @@ def _width(neutral: FloatArray) -> float:
 def _message(names: Sequence[str], found: Sequence[Misfit]) -> str:
     """A line on shapes that are out of register for one cause."""
     many = len(found) > 1
-    who = _listed([names[one.shape] for one in found])
+    who = listed([names[one.shape] for one in found])
     are, do = ("are", "") if many else ("is", "s")
     low, high = (f"{end(one.amount for one in found):.3g}" for end in (min, max))
     amount = low if low == high else f"{low} to {high}"
@@ -224,8 +223,3 @@ def _message(names: Sequence[str], found: Sequence[Misfit]) -> str:
         "is another mesh; no option mends that: export all from one mesh, in its order",
     }
     return f"{who} {wording[found[0].cause]}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(printable(name) for name in names[:_MOST_NAMES]) + more

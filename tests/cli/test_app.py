@@ -11,6 +11,7 @@ import pytest
 
 from facert.cli import app
 from facert.cli.commands import inspect
+from facert.cli.shared import console
 from facert.io.formats import write_take_file
 
 
@@ -52,3 +53,10 @@ def test_what_follows_two_dashes_is_a_name(facert):
     refused = facert("inspect", "--", "-q")
     assert refused.code == 3
     assert refused.err.startswith("error: -q: file: expected an existing file")
+
+
+def test_foreign_names_in_the_log_move_no_cursor():
+    console.configure(quiet=False, verbose=False)
+    with console.err.capture() as shown:
+        console.log.warning("no shape for %s", "\x1b[31mjaw\x9b2J")
+    assert shown.get() == "warning: no shape for \\x1b[31mjaw\\x9b2J\n"

@@ -353,3 +353,12 @@ def test_a_number_that_is_none_spoils_no_other_value_of_its_packet(wrong, caplog
     bad = [message("/m/chin", 1.0, wrong, 2.0), message("/m/nose", 1.0, 2.0, 3.0)]
     observed = markers.decode(bundle(*bad, message("/m/frame")))
     np.testing.assert_array_equal(observed.values, [[math.nan] * 3, [1.0, 2.0, 3.0]])
+
+
+def test_names_of_a_stream_go_to_the_log_as_text(caplog):
+    feed(weights(MANY), *values(["\x1b[31mjaw", "two\nlines"]), APPLY)
+    assert "\\x1b[31mjaw, two\\nlines" in caplog.text
+    caplog.clear()
+    feed(weights(MANY), *values(["jawOpen", "JawOpen"]), APPLY)
+    assert "jawOpen and JawOpen are one name" in caplog.text
+    assert "/jawOpen" not in caplog.text

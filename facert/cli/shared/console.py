@@ -6,6 +6,8 @@ import logging
 
 from rich.console import Console
 
+from facert.errors import escaped
+
 # Rich honours NO_COLOR and drops styles when the stream is not a terminal.
 out = Console(soft_wrap=True, highlight=False)
 err = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -19,7 +21,8 @@ class _StderrHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         warning = record.levelno >= logging.WARNING
         prefix = "warning: " if warning else ""
-        err.print(prefix + self.format(record), style="yellow" if warning else None, markup=False)
+        lines = map(escaped, self.format(record).split("\n"))  # names in it may be foreign
+        err.print(prefix + "\n".join(lines), style="yellow" if warning else None, markup=False)
 
 
 _FIGURES = {"seconds": "training seconds", "motion a frame": "motion per frame"}
