@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from facert.data.text import printable
+from facert.data.text import listed, printable
 from facert.errors import InputError
 from facert.io.gltf import Document
 from facert.io.vrm import names_of_single_targets
@@ -39,7 +39,7 @@ def target_names(document: Document) -> dict[int, tuple[str, ...]]:
     counts = {mesh: count for mesh, count in counts.items() if count}
     singles = names_of_single_targets(document.root)
     stated = {m: _stated(document, m, count, singles) for m, count in counts.items()}
-    nameless = [mesh for mesh, names in stated.items() if names is None]
+    nameless = [mesh for mesh, names in stated.items() if names is None or not all(names)]
     prefixes = dict(zip(nameless, _prefixes(document, nameless), strict=True))
     return {
         mesh: _numbered(names or [""] * counts[mesh], prefixes.get(mesh, ""))
@@ -56,21 +56,21 @@ def _stated(
 ) -> list[str] | None:
     """The names that a mesh's targets have somewhere, None without any; some may be empty."""
     mesh = document.root["meshes"][number]
-    lists = list(_lists(mesh))
+    lists = [names for names in _lists(mesh) if any(names)]
     for names in lists:
         if len(names) == count + 1 and names[0].lower() in _REST:
             names = names[1:]
         if len(names) == count and _differ(names):
             return names
+    accessors = _names_of_accessors(document, mesh)
+    if len(accessors) == count and _differ(accessors) and all(accessors):
+        return accessors
     if lists:
-        found = f"{len(set(lists[0]))}: {', '.join(lists[0][:4])}"
+        found = f"{len(set(lists[0]))}: {listed(lists[0], 4)}"
         fix = "Export it again, with the names of its shape keys."
         raise InputError(
             f"targetNames of {_label(mesh, number)}", f"{count} different names", found, fix
         )
-    accessors = _names_of_accessors(document, mesh)
-    if len(accessors) == count and _differ(accessors) and all(accessors):
-        return accessors
     expressions = [singles.get((number, index), "") for index in range(count)]
     return expressions if any(expressions) and _differ(expressions) else None
 
@@ -118,7 +118,7 @@ def _label(mesh: dict[str, Any], number: int) -> str:
 
 
 def _prefixes(document: Document, meshes: Sequence[int]) -> list[str]:
-    """What stands before the numbers of the targets of meshes without names, and a warning."""
+    """What stands before the numbers of targets without names in these meshes, and a warning."""
     if not meshes:
         return []
     labels = [_label(document.root["meshes"][mesh], mesh) for mesh in meshes]
@@ -126,10 +126,11 @@ def _prefixes(document: Document, meshes: Sequence[int]) -> list[str]:
         labels = [f"mesh{mesh + 1}" for mesh in meshes]
     prefixes = [f"{label}_" for label in labels] if len(labels) > 1 else [""]
     shown = f"{prefixes[0]}target1, {prefixes[0]}target2, ..."
-    log.warning("%s: the morph targets have no names: they are called %s", ", ".join(labels), shown)
+    log.warning("%s: morph targets without a name are called %s", ", ".join(labels), shown)
     return prefixes
 
 
 def _numbered(names: Sequence[str], prefix: str) -> tuple[str, ...]:
-    """The names, with numbers for empty ones."""
-    return tuple(name or f"{prefix}target{i}" for i, name in enumerate(names, start=1))
+    """The names, with numbers for empty ones, which no other has."""
+    filled = tuple(name or f"{prefix}target{i}" for i, name in enumerate(names, start=1))
+    return filled if _differ(filled) else _numbered(names, f"nameless_{prefix}")

@@ -22,7 +22,7 @@ from facert.errors import InputError
 from facert.io.gltf import MAX_VALUES, Document, open_gltf
 from facert.io.gltf_names import target_names
 from facert.io.gltf_scene import Scene, displaced, mirrored, scene_of, transformed
-from facert.io.vrm import Bind, expressions_of
+from facert.io.vrm import Bind, expressions_of, looks_back
 
 log = logging.getLogger("facert")
 
@@ -138,7 +138,7 @@ def _part(scene: Scene, one: _Primitive, names: Sequence[str]) -> _PlacedMesh:
 def _warn_of_size(vertices: FloatArray) -> None:
     """Warn of a face that is no face's size in metres: exporters forget their unit."""
     size = float(np.ptp(vertices, axis=0).max())
-    if not SMALLEST <= size <= LARGEST:
+    if size < SMALLEST or size > LARGEST:  # NaN is refused with the rig
         log.warning(
             "the mesh is %.3g m large, as glTF counts in metres: where its numbers are of another "
             "unit, give that: --in-units cm",
@@ -174,6 +174,8 @@ def _expressions(document: Document, shapes: str | None) -> dict[str, list[Bind]
         other = TARGETS if shapes == EXPRESSIONS else EXPRESSIONS
         listed = printable(", ".join(found), 600)
         log.info("expressions: %s; --shapes %s for a rig of those instead", listed, other)
+    if looks_back(document.root):
+        log.info("an avatar of VRM 0 looks along -z: pictures and pages show it from behind")
     return found
 
 

@@ -67,6 +67,9 @@ class Scene:
         joint, weight = np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
         if 16 * len(joint) > MAX_VALUES:
             raise ValueError(f"{len(joint)} vertices that follow joints")
+        if not np.isfinite(weight).all():
+            raise ValueError("NaN or infinity for the weight of a joint")
+        weight = np.maximum(weight, 0.0)  # below 0 by rounding
         weight[weight.sum(axis=1) == 0, 0] = 1.0
         share = weight / weight.sum(axis=1, keepdims=True)
         blended = np.zeros((len(joint), 4, 4))

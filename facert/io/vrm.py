@@ -40,6 +40,12 @@ def expressions_of(root: dict[str, Any]) -> dict[str, list[Bind]]:
     return expressions
 
 
+def looks_back(root: dict[str, Any]) -> bool:
+    """Whether the avatar looks along -z, as those of VRM 0 do, unlike other glTF files."""
+    extensions = root.get("extensions", {})
+    return "VRM" in extensions and "VRMC_vrm" not in extensions
+
+
 def names_of_single_targets(root: dict[str, Any]) -> dict[tuple[int, int], str]:
     """Names of targets, by mesh and index, that are each the whole of an expression."""
     single = {name: b[0] for name, b in expressions_of(root).items() if len(b) == 1}

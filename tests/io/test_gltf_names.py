@@ -112,7 +112,7 @@ def test_targets_without_names_of_two_meshes_are_four(tmp_path, caplog, meshes, 
     first, second = prefixes
     wanted = tuple(f"{mesh}_target{number}" for mesh in prefixes for number in (1, 2))
     assert rig.names == wanted
-    assert f"{first}, {second}: the morph targets have no names" in caplog.text
+    assert f"{first}, {second}: morph targets without a name are called" in caplog.text
     np.testing.assert_allclose(rig.shapes[2], [[0, 0, 0]] * 3 + [[0, 2, 0]] * 3)
     assert read_gltf_take(path).source.names == wanted[2:]
 
@@ -128,6 +128,32 @@ def test_an_empty_name_becomes_a_number_and_a_number_a_name(tmp_path: Path) -> N
     builder = nameless(Builder(), "head")
     builder.document.meshes[0].extras = {"targetNames": [None, 7]}
     assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == ("target1", "7")
+
+
+def test_numbers_for_empty_names_never_merge_targets(tmp_path: Path) -> None:
+    builder = nameless(Builder(), "head")
+    builder.document.meshes[0].extras = {"targetNames": ["target2", ""]}
+    rig = read_gltf_rig(builder.save(tmp_path / "a.glb"))
+    assert rig.names == ("target2", "nameless_target2")
+    builder = nameless(Builder(), "head", "teeth")
+    for mesh in builder.document.meshes:
+        mesh.extras = {"targetNames": ["jawOpen", ""]}
+    rig = read_gltf_rig(builder.save(tmp_path / "b.glb"))
+    assert rig.names == ("jawOpen", "head_target2", "teeth_target2")
+
+
+@pytest.mark.parametrize("stale", [["a"], ["a", "a"], ["a", "b", "c"]])
+def test_names_of_accessors_count_where_a_list_is_stale(tmp_path: Path, stale: list[str]) -> None:
+    builder = nameless(Builder(), "head")
+    in_accessors(builder.document)
+    builder.document.meshes[0].extras = {"targetNames": stale}
+    assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == tuple(NAMES)
+
+
+def test_a_list_of_no_names_is_as_none(tmp_path: Path) -> None:
+    builder = nameless(Builder(), "head")
+    builder.document.meshes[0].extras = {"targetNames": []}
+    assert read_gltf_rig(builder.save(tmp_path / "a.glb")).names == ("target1", "target2")
 
 
 @pytest.mark.parametrize("names", [["jawOpen"], ["a", "b", "c"], ["a", "a"]])

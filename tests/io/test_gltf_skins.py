@@ -10,6 +10,7 @@ from gltf_files import Builder
 from scipy.spatial.transform import Rotation
 
 from facert.data.rig import Rig
+from facert.errors import InputError
 from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
 
 HEAD = np.float32([[-0.1, 1.5, 0], [0.1, 1.5, 0], [-0.1, 1.7, 0.02]])
@@ -109,6 +110,7 @@ def test_without_inverse_bind_matrices_the_joints_alone_count(tmp_path: Path) ->
         np.uint8([[128, 127, 0, 0], [254, 0, 0, 0], [60, 60, 0, 0]]),
         np.uint16([[40000, 25535, 0, 0], [1, 1, 0, 0], [65535, 0, 0, 0]]),
         np.float32([[0.5, 0.1, 0, 0], [3, 1, 0, 0], [0, 0, 0, 0]]),
+        np.float32([[0.5, -1e-9, 0, 0], [-1, 0, 0, 0], [1, -1, 0, 0]]),
     ],
 )
 def test_weights_count_as_shares_of_their_sum(tmp_path: Path, weights: np.ndarray) -> None:
@@ -116,6 +118,16 @@ def test_weights_count_as_shares_of_their_sum(tmp_path: Path, weights: np.ndarra
     joints = [builder.joint(), builder.joint()]
     skinned(builder, matrix(), weights, skin=builder.skin(joints))
     require_head(builder.save(tmp_path / "head.glb"))
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_weight_of_a_joint_that_is_no_number_is_one_error(tmp_path, wrong, recwarn) -> None:
+    builder = Builder()
+    weights = np.float32([[wrong, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]])
+    skinned(builder, matrix(), weights, skin=builder.skin([builder.joint(), builder.joint()]))
+    with pytest.raises(InputError, match="NaN or infinity for the weight of a joint"):
+        read_gltf_rig(builder.save(tmp_path / "head.glb"))
+    assert not recwarn.list
 
 
 def test_each_vertex_follows_its_own_joints_also_of_a_second_set(tmp_path: Path) -> None:

@@ -85,6 +85,7 @@ def test_an_avatar_is_a_rig_whose_expressions_are_listed(tmp_path, caplog, exten
     for name in ("joy", "a", "JawOpen"):
         assert name in caplog.text
     assert "--shapes expressions" in caplog.text
+    assert ("looks along -z" in caplog.text) == (extensions is VRM0)
     assert len(read_mesh(path).vertices) == 6
 
 
