@@ -113,8 +113,9 @@ def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
     """A take or rig with its names replaced.
 
     `names` goes from those in the file, in any spelling, to the new ones; ``"Face:*"`` to ``"*"``
-    removes a prefix from all that have it. Of a take the markers or weights and the controls are
-    renamed. What is not in the mapping keeps its name.
+    removes a prefix from all that have it; of two patterns that fit a name the first counts. Of a
+    take the markers or weights and the controls are renamed. What is not in the mapping keeps its
+    name.
 
     Raises `InputError` for a name that the file does not have, with the nearest one that it has,
     and for two that would bear one name.
@@ -139,9 +140,9 @@ def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
 def _renamed(lists: Sequence[tuple[str, ...]], names: Mapping[str, str]) -> list[tuple[str, ...]]:
     """Lists of names with those in a mapping replaced; all of it must be in one of them."""
     there = tuple(dict.fromkeys(chain(*lists)))
-    patterns = {key for key in names if "*" in key and key not in there}
+    patterns = {key: ours for key, ours in names.items() if "*" in key and key not in there}
     plain = {theirs: ours for theirs, ours in names.items() if theirs not in patterns}
-    fitting = _fitting({pattern: names[pattern] for pattern in patterns}, there)
+    fitting = _fitting(patterns, there)
     index = NameIndex.among(there, list(plain), "--map")
     _require_known([name for name in plain if index.find(name) is None], there)
     result = []
@@ -167,7 +168,7 @@ def _require_known(unknown: Sequence[str], there: Sequence[str]) -> None:
 
 
 def _fitting(patterns: Mapping[str, str], there: Sequence[str]) -> dict[str, str]:
-    """The new names of those that fit a pattern: what its * stands for is kept."""
+    """The new names of those that fit a pattern, the first one: what its * stands for is kept."""
     new: dict[str, str] = {}
     for pattern, ours in patterns.items():
         if pattern.count("*") != 1 or ours.count("*") != 1:
@@ -178,5 +179,5 @@ def _fitting(patterns: Mapping[str, str], there: Sequence[str]) -> dict[str, str
         matches = {name: kept.fullmatch(composed(name)) for name in there}
         found = {name: ours.replace("*", one[1]) for name, one in matches.items() if one}
         _require_known([] if found else [pattern], there)
-        new |= found
+        new = found | new
     return new

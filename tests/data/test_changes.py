@@ -97,3 +97,12 @@ def test_a_map_sees_through_a_prefix_and_forms_of_unicode() -> None:
     names = ("Face1:jawOpen", "Face1:" + unicodedata.normalize("NFD", "sourcilLevé"), "Face1:x")
     rig = Rig(np.eye(3), np.zeros((3, 3, 3)), names, [[0, 1, 2]])
     assert renamed(rig, {"JawOpen": "a", "sourcilLevé": "b"}).names == ("a", "b", "Face1:x")
+
+
+def test_of_two_patterns_that_fit_a_name_the_first_counts() -> None:
+    names = tuple(f"Face:lip{letter}_L" for letter in "abcdefgh")
+    rig = Rig(np.eye(3), np.zeros((8, 3, 3)), names, [[0, 1, 2]])
+    patterns = {f"{name[:-2]}*": f"{name[5:-2]}*" for name in names}
+    assert renamed(rig, patterns | {"*_L": "*Left"}).names == tuple(name[5:] for name in names)
+    wanted = tuple(f"{name[:-2]}Left" for name in names)
+    assert renamed(rig, {"*_L": "*Left"} | patterns).names == wanted
