@@ -18,6 +18,8 @@ AGREES = 0.01
 """Rates agree within this share."""
 
 _USUAL = (10.0, 12.0, 15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
+_LONGEST = 2.0**31  # frames of a gap
+_MOST = 2.0**53  # frames
 _FITS = 2e-4  # the share by which clocks go wrong
 
 
@@ -96,7 +98,7 @@ def frames_at(time: FloatArray, fps: float, slack: float) -> IntArray | None:
     frames = np.rint(after - offset)
     reach = min(slack + 0.5 * fps * resolution(time), 0.45)
     on_grid = np.abs(after - offset - frames).max() <= reach
-    if not on_grid or (np.diff(frames) < 1).any():
+    if not on_grid or (np.diff(frames) < 1).any() or frames[-1] - frames[0] > _MOST:
         return None
     return np.asarray(frames - frames[0], dtype=np.int64)
 
@@ -125,7 +127,7 @@ def _fitted(time: FloatArray) -> _Fit:
     steps = np.diff(time)
     median = float(np.quantile(steps, 0.5, method="lower"))
     usual = float(np.mean(steps[(steps >= 0.49 * median) & (steps <= 1.6 * median)]))
-    taken = np.where(steps < 1.6 * usual, 1.0, np.rint(steps / usual))
+    taken = np.where(steps < 1.6 * usual, 1.0, np.minimum(np.rint(steps / usual), _LONGEST))
     clean = np.abs(steps / usual - taken) <= np.where(taken == 1, 0.6, 0.15)
     frames = np.append(0, np.cumsum(taken))
     run = np.append(0, np.cumsum(~clean))

@@ -1,8 +1,8 @@
 """Columns that are the coordinates of markers, in the spellings of many programs.
 
 ``NAME.x``, ``NAME_x``, ``NAME:X``, ``NAME X (mm)``, ``NAME.tx``, ``NAME.posX``,
-``NAME.Translate X``, ``NAME[x]``, ``nameX``, ``X_0``. Three such columns are a marker where every
-column is one of three, and their values can be positions; else they are weights.
+``NAME.Translate X``, ``NAME[x]``, ``nameX``, ``NAMEX``, ``X_0``. Three such columns are a marker
+where every column is one of three, and their values can be positions; else they are weights.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ log = logging.getLogger("facert")
 
 _POSITION = r"(?:t|pos|position|trans|translate|translation|loc|location|coord)"
 _UNIT = r"(?:\s*[\[(]\s*(?P<unit>mm|cm|dm|m|in|ft)\s*[\])]|_(?P<unit_>mm|cm))?"
-_SPELLINGS = tuple(
+_OWN = re.compile(r"(?P<name>.+)\.(?P<axis>[xyz])")
+_PLAIN = re.compile(r"(?P<name>.+)[._](?P<axis>[xyz])", re.IGNORECASE)
+_POSITIONS, *_OTHERS = (
     re.compile(pattern, flags)
     for pattern, flags in (
-        (r"(?P<name>.+)[._](?P<axis>[xyz])", re.IGNORECASE),
         (
             rf"(?P<name>.+?)[._:\s/|-]\s*{_POSITION}[._:\s-]*(?P<axis>[xyz]){_UNIT}",
             re.IGNORECASE,
@@ -33,10 +34,13 @@ _SPELLINGS = tuple(
         (rf"(?P<name>.+?)\s*[._:\s/|-]\s*(?P<axis>[xyz]){_UNIT}", re.IGNORECASE),
         (r"(?P<name>.+?)\s*[\[(]\s*(?P<axis>[xyz])\s*[\])]", re.IGNORECASE),
         (r"(?P<name>.*[^\W_A-Z])(?P<axis>[XYZ])", 0),
+        (r"(?P<name>[^\W_a-z]{2,})(?P<axis>[XYZ])", 0),
+        (r"(?P<name>[^\W_]{3,})(?P<axis>[xyz])", 0),
         (r"(?P<axis>[xyz])[._:\s-]?(?P<name>\d+)", re.IGNORECASE),
         (r"(?P<axis>[xyz])[._:\s-](?P<name>.+)", re.IGNORECASE),
     )
 )
+_SPELLINGS = (_OWN, _POSITIONS, _PLAIN, *_OTHERS)
 _ROTATIONS = {"rot", "rotation", "rotate", "angle", "euler", "quat", "quaternion", "scale"}
 
 _ENOUGH = 10  # rows that show of what kind values are
@@ -70,10 +74,10 @@ def markers_among(names: Sequence[str], values: FloatArray, sure: bool = False) 
         if markers.columns.size == len(names):
             if not sure and not _are_positions(markers, values):
                 return None
-            if spelling is not _SPELLINGS[0] and not sure:
+            if spelling not in (_OWN, _PLAIN) and not sure:
                 log.info("markers by columns such as %r", names[markers.columns[0, 0]])
             return markers
-        if spelling is _SPELLINGS[0] and 2 * markers.columns.size > len(names):
+        if spelling is _PLAIN and 2 * markers.columns.size > len(names):
             _refuse_mixture(markers, names, values)
     return None
 

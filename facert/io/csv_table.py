@@ -41,7 +41,7 @@ from facert.io.lines import (
 )
 from facert.io.livelink import is_livelink, read_livelink
 from facert.io.marker_header import marker_header
-from facert.io.table import Table, table_of_lines
+from facert.io.table import Table, is_number, is_text, table_of_lines
 from facert.io.table_take import Reading, take_of_table, unlogged
 
 CURVE = "iteration,objective,gradient_norm,seconds"
@@ -89,7 +89,7 @@ def read_table(
             table = table_of_lines(above.names, above.body)
             take = take_of_table(table, Reading(above.rate or fps, tuple(keep), sparse))
             return replace(take, units=above.unit)
-        _require_names(header)
+        _require_names(header, rows)
         return take_of_table(table_of_lines(header, rows), Reading(fps, tuple(keep), sparse))
 
 
@@ -105,13 +105,13 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     names, values = named_columns(take)
-    body = _body(take.time, values)
     markers = take.params is None and take.source.kind == "markers"
     mark = _MARKS["markers" if markers else "weights"]
     plain = _header(["time", *names])
-    header = plain if _is_own(plain) and _reads_back(names, body, markers) else None
+    own = _is_own(plain) and _reads_back(names, take.time, values, markers)
     with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        file.write((header or _header([mark, *names])) + body.replace("nan", ""))
+        file.write(plain if own else _header([mark, *names]))
+        file.write(_body(take.time, values).replace("nan", ""))
 
 
 def bears_mark(path: Path) -> bool:
@@ -153,8 +153,15 @@ def _read_marked(text: str) -> Take:
     return Take(time, Source(values, names), fps=nominal_rate(time))
 
 
-def _require_names(header: Sequence[str]) -> None:
-    """Refuse a first line of numbers."""
+def _require_names(header: Sequence[str], rows: Sequence[Line]) -> None:
+    """Refuse a first line of numbers, and a second one of names."""
+    numbers = [column for column, cell in enumerate(rows[-1].cells) if is_number(cell)]
+    cells = [rows[0].cells[column].strip() for column in numbers if column < len(rows[0].cells)]
+    names = list(filter(is_text, cells))
+    if 2 * len(names) > len(numbers):
+        fix = "Leave one line of names: of the weights, or NAME.x, NAME.y, NAME.z."
+        found = f"names again, such as {names[-1][:40]!r}"
+        raise InputError(f"line {rows[0].number}", "numbers below the header", found, fix)
     if all(map(_NUMBER.fullmatch, header)) and any("." in cell for cell in header):
         found, fix = "numbers only", "Write the names of the columns into a first line."
         raise InputError("header", "names of the columns", found, fix)
@@ -163,11 +170,23 @@ def _require_names(header: Sequence[str]) -> None:
 def _body(time: FloatArray, values: FloatArray) -> str:
     """The rows of a table; times are written in full where ten digits do not tell them apart."""
     body = io.StringIO()
-    short = np.array([float(f"{one:.10g}") for one in (time[0], time[-1])])
-    close = np.abs(short - time[[0, -1]]).max() <= 1e-6 and (np.diff(time) > 1e-5).all()
-    formats = ["%.10g" if close else "%.17g", *["%.10g"] * values.shape[1]]
+    formats = ["%.10g" if _is_short(time) else "%.17g", *["%.10g"] * values.shape[1]]
     np.savetxt(body, np.column_stack([time, values]), fmt=formats, delimiter=",")
     return body.getvalue()
+
+
+def _is_short(time: FloatArray) -> bool:
+    """Whether ten digits tell times (T,) apart."""
+    short = np.array([float(f"{one:.10g}") for one in (time[0], time[-1])])
+    return bool(np.abs(short - time[[0, -1]]).max() <= 1e-6 and (np.diff(time) > 1e-5).all())
+
+
+def _in_digits(values: FloatArray) -> FloatArray:
+    """Values to ten digits, as they are written."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        places = np.power(10.0, 9 - np.floor(np.log10(np.abs(values))))
+        rounded = np.rint(values * places) / places
+    return np.where(np.isfinite(rounded), rounded, values)
 
 
 def _header(cells: Sequence[str]) -> str:
@@ -178,12 +197,13 @@ def _header(cells: Sequence[str]) -> str:
     return f'"{first}",{line.getvalue()}'
 
 
-def _reads_back(names: Sequence[str], body: str, markers: bool) -> bool:
+def _reads_back(names: Sequence[str], time: FloatArray, values: FloatArray, markers: bool) -> bool:
     """Whether a table of these columns is read as what it is without more in its header.
 
     Weights may be read as poses as well.
     """
-    numbers = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
+    seconds = _in_digits(time) if _is_short(time) else time
+    numbers = np.column_stack([seconds, _in_digits(values)])
     expected = [name[:-2] for name in names[::3]] if markers else list(names)
     try:
         header, _ = parse_csv(_header(["time", *names]) + "0\n")

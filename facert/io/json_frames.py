@@ -22,6 +22,8 @@ _NAME_KEYS = ("categoryName", "category_name", "name", "label", "key", "shape", 
               "blendshape", "displayName", "display_name")  # fmt: skip
 _SCORE_KEYS = ("score", "value", "weight", "coefficient", "amount")
 _AXES = ("x", "y", "z")
+_OF_POINTS = frozenset((*_AXES, "w", "h", "width", "height", "visibility", "presence", "score",
+                        "confidence", "id", "index", *_NAME_KEYS))  # fmt: skip
 _DEEPEST = 6
 _CLOCKS = (Role.CLOCK, Role.FRAME)
 
@@ -34,6 +36,8 @@ class Frame:
     """Numbers and texts of the frame's own."""
     groups: dict[str, dict[str, Number]] = field(default_factory=dict)
     """Named numbers under each key."""
+    points: dict[str, dict[str, Number]] = field(default_factory=dict)
+    """Coordinates of the points, or landmarks, in a list under each key."""
     others: set[str] = field(default_factory=set)
     """Keys of numbers without names."""
 
@@ -242,22 +246,24 @@ def _numbers_of(name: str, value: Any) -> dict[str, Number] | None:
     """A weight, the score of one, or the coordinates of a marker in a group; None for another."""
     if _is_number(value):
         return {name: value} if role_of_name(name) is None else None
-    if isinstance(value, dict):
-        if value.keys() == set(_AXES) and all(map(_is_number, value.values())):
-            return {f"{name}.{axis}": value[axis] for axis in _AXES}
-        score = _score(value)
-        return None if score is None else {name: score}
-    if isinstance(value, list) and len(value) == len(_AXES) and all(map(_is_number, value)):
-        return {f"{name}.{axis}": one for axis, one in zip(_AXES, value, strict=True)}
-    return None
+    xyz = _xyz(value)
+    if xyz is not None:
+        return {f"{name}.{axis}": one for axis, one in zip(_AXES, xyz, strict=True)}
+    score = _score(value) if isinstance(value, dict) else None
+    return None if score is None else {name: score}
 
 
 def _add_list(
     frame: Frame, key: str, value: Sequence[Any], names: Sequence[str], depth: int
 ) -> None:
     pairs = _pairs(value)
-    if pairs is not None:
+    points = {} if value and _is_row(value[0], names) else _points(value)
+    if points:
+        frame.points[key] = points
+    elif pairs is not None:
         frame.groups.setdefault(key, {}).update(pairs)
+    elif value and _is_point(value[0]):  # in a plane, or a box
+        frame.others.add(key)
     elif all(one is None or _is_number(one) for one in value):
         _add_numbers(frame, key, value, names)
     elif isinstance(value[0], dict | list):  # of several faces the first
@@ -274,6 +280,31 @@ def _add_numbers(frame: Frame, key: str, value: Sequence[Any], names: Sequence[s
         raise InputError(key, expected, found, "Export it again.")
     elif value:
         frame.others.add(key)
+
+
+def _points(value: Sequence[Any]) -> dict[str, Number]:
+    """Coordinates of points in space, named as they are or else by number; empty for others."""
+    points: dict[str, Number] = {}
+    for number, one in enumerate(value):
+        xyz = _xyz(one)
+        if xyz is None:
+            return {}
+        names = (one[key] for key in _NAME_KEYS if key in one) if isinstance(one, dict) else ()
+        name = next((name for name in names if isinstance(name, str) and name), str(number))
+        points |= {f"{name}.{axis}": place for axis, place in zip(_AXES, xyz, strict=True)}
+    return points if len(points) == len(_AXES) * len(value) else {}
+
+
+def _is_point(value: Any) -> bool:
+    return isinstance(value, dict) and {"x", "y"} <= value.keys() <= _OF_POINTS
+
+
+def _xyz(value: Any) -> Sequence[Number] | None:
+    """The coordinates of ``{x, y, z}``, with a name or confidence or not, or of ``[x, y, z]``."""
+    if _is_point(value):
+        value = [value.get(axis) for axis in _AXES]
+    whole = isinstance(value, list) and len(value) == len(_AXES)
+    return value if whole and all(map(_is_number, value)) else None
 
 
 def _pairs(value: Sequence[Any]) -> dict[str, Number] | None:

@@ -2,7 +2,7 @@
 
 The last line has ``X,Y,Z`` for each marker behind its columns of frames and times; a line above has
 the markers' names, once or three times each. Vicon states rate and unit in lines of their own,
-Motive in its first line.
+Motive in its first line; pandas names the columns in front above, or in a line of its own below.
 """
 
 from __future__ import annotations
@@ -49,14 +49,17 @@ def _below(lines: Sequence[Line], index: int, front: int, width: int) -> MarkerH
     markers = _marker_names(above, front, width)
     if markers is None:
         return None
-    after = lines[index + 1].cells[front:] if index + 1 < len(lines) else []
-    stated = {cell.strip().lower() for cell in after} - {""}
+    after = [cell.strip() for cell in lines[index + 1].cells] if index + 1 < len(lines) else []
+    stated = {cell.lower() for cell in after[front:]} - {""}
     has_units = len(stated) == 1 and stated <= _KNOWN
-    leading = tuple(cell.strip() for cell in lines[index].cells[:front])
+    below = after[:front] if not stated and _is_text(after[:front]) else []
+    first = index + 1 + (has_units or bool(below))
+    leading = [cell.strip() for cell in lines[index].cells[:front]]
     end = front + width
-    body = [Line(line.number, _filled(line.cells, end)) for line in lines[index + 1 + has_units :]]
+    body = [Line(line.number, _filled(line.cells, end)) for line in lines[first:]]
     return MarkerHeader(
-        names=leading + tuple(f"{name}.{axis}" for name in markers for axis in _AXES),
+        names=_leading([below, leading, *reversed(above)], front)
+        + tuple(f"{name}.{axis}" for name in markers for axis in _AXES),
         body=body,
         rate=_rate(above),
         unit=stated.pop() if has_units else _unit(above),
@@ -73,6 +76,17 @@ def _marker_names(above: Sequence[Sequence[str]], front: int, width: int) -> lis
         if alone and all(names) and len(set(names)) == len(names) and not of_ids:
             return names
     return None
+
+
+def _leading(lines: Sequence[Sequence[str]], front: int) -> tuple[str, ...]:
+    """The names of the columns in front: each of the first of these lines that has one."""
+    columns = itertools.islice(itertools.zip_longest(*lines, fillvalue=""), front)
+    return tuple(next(filter(None, cells), "") for cells in columns)
+
+
+def _is_text(cells: Sequence[str]) -> bool:
+    """Whether some cells are filled, and none is a number."""
+    return any(cells) and not any(map(_NUMBER.fullmatch, cells))
 
 
 def _filled(cells: Sequence[str], width: int) -> list[str]:

@@ -17,7 +17,7 @@ _TRUTHS = {
     **dict.fromkeys(("na", "n/a", "#n/a", "null", "none"), "nan"),
 }
 # No number, whatever the language: it has a letter, or the parts of a time of day or a date.
-_TEXT = re.compile(r".*([^\W\d_]|:).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
+_TEXT = re.compile(r".*([^\W\d_]|:|\d;\d).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,23 +67,27 @@ def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:
         numbers = np.full((len(rows), len(header)), np.nan)
         for column in columns:
             cells = [row.cells[column].strip() for row in rows]
-            if _is_text(cells):
+            if _are_texts(cells):
                 texts[column] = cells
             else:
                 numbers[:, column] = _numbers(cells, rows, header, column)
     return Table(tuple(header), numbers, texts, lambda row: f"line {rows[row].number}")
 
 
-def _is_text(cells: Sequence[str]) -> bool:
+def _are_texts(cells: Sequence[str]) -> bool:
     """Whether no cell is a number or a truth, but for blank ones."""
     filled = [cell for cell in cells if cell]
-    return bool(filled) and all(
-        _TEXT.fullmatch(cell) and cell.lower() not in _TRUTHS and not _is_number(cell)
-        for cell in filled
-    )
+    return bool(filled) and all(map(is_text, filled))
 
 
-def _is_number(cell: str) -> bool:
+def is_text(cell: str) -> bool:
+    """Whether a cell is no number, truth or blank, in whatever language."""
+    plain = _TEXT.fullmatch(cell) and cell.lower() not in _TRUTHS
+    return bool(plain) and not is_number(cell)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number."""
     try:
         float(cell)
     except ValueError:

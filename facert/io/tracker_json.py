@@ -10,6 +10,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,9 @@ from facert.io.table_take import Reading, take_of_table
 
 log = logging.getLogger("facert")
 
-_AXES = frozenset(("x", "y", "z", "w", "pitch", "yaw", "roll", "rx", "ry", "rz"))
+# Of a head, an eye or a box around the face.
+_AXES = frozenset(("x", "y", "z", "w", "h", "width", "height", "pitch", "yaw", "roll",
+                   "rx", "ry", "rz"))  # fmt: skip
 _OWN = re.compile(
     r'\{("createdBy": "[^"]*", )?"exportFps": [^,]*, "trackPath": "", "startTimecode": '
 )
@@ -46,7 +49,7 @@ def read_json_take(path: Path, fps: float | None = None, keep: Sequence[str] = (
         document = parsed(read_text(path))
         if isinstance(document, dict) and holds_curves(document) and not has_times(document):
             return take_of_curves(document, fps)
-        table = _table(frames_of(document))
+        table = _table(_or_points(frames_of(document)))
         return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep)))
 
 
@@ -54,6 +57,24 @@ def is_mixed(path: Path) -> bool:
     """Whether numbers in a JSON file may be no weights: unless facert wrote it."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         return _OWN.match(file.read(_HEAD)) is None
+
+
+def _or_points(frames: Sequence[Frame]) -> Sequence[Frame]:
+    """The frames with the points of their longest list as markers, where they have no weights."""
+    count = Counter({key: len(points) for frame in frames for key, points in frame.points.items()})
+    groups = (group for frame in frames for group in frame.groups.values())
+    plain = any(_is_weight(*one) for frame in frames for one in frame.plain.items())
+    if not count or plain or any(not names.keys() <= _AXES for names in groups):
+        return [replace(frame, others=frame.others | frame.points.keys()) for frame in frames]
+    key = count.most_common(1)[0][0]
+    return [_of_points(frame, key) for frame in frames]
+
+
+def _of_points(frame: Frame, key: str) -> Frame:
+    """A frame whose points under a key are its markers."""
+    others = frame.others | (frame.groups.keys() | frame.points.keys()) - {key}
+    plain = {name: value for name, value in frame.plain.items() if name not in _AXES}
+    return Frame(plain, {key: frame.points.get(key, {})}, others=others)
 
 
 def _table(frames: Sequence[Frame]) -> Table:
@@ -95,12 +116,14 @@ def _columns(frames: Sequence[Frame], groups: Sequence[str]) -> dict[tuple[str, 
 
 def _weights(frames: Sequence[Frame]) -> list[str]:
     """The keys of groups that are weights, the largest first; none where frames are plain."""
-    counts: Counter[str] = Counter()
+    counts, of_face = Counter[str](), Counter[str]()
     for frame in frames:
         for key, group in frame.groups.items():
             counts[key] += len(group)
+            of_face[key] += len(group.keys() - _AXES)
     plain = sum(_is_weight(name, value) for frame in frames for name, value in frame.plain.items())
-    ranked = [key for key, count in counts.most_common() if count]
+    filled = [key for key, count in counts.items() if count]
+    ranked = sorted(filled, key=lambda key: (of_face[key], counts[key]), reverse=True)
     main = ranked[:1] if ranked and counts[ranked[0]] > plain else []
     facial = [key for key in ranked if key not in main and _is_of_face(key, frames)]
     used = main + facial
@@ -111,7 +134,7 @@ def _weights(frames: Sequence[Frame]) -> list[str]:
 
 
 def _is_weight(name: str, value: Number | str) -> bool:
-    return not isinstance(value, str) and role_of_name(name) is None
+    return not isinstance(value, str) and role_of_name(name) is None and name not in _AXES
 
 
 def _is_of_face(key: str, frames: Sequence[Frame]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facert.data.rate import BROKEN, nominal_rate, standard_rate
+from facert.data.rate import BROKEN, frames_shown, nominal_rate, standard_rate
 
 WHOLE = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 90, 100, 120)
 
@@ -53,3 +53,15 @@ def test_an_odd_rate_stays() -> None:
 )  # fmt: skip
 def test_stated_rates_stand_for_those_of_television(stated, rate) -> None:
     assert standard_rate(stated) == rate
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("time", [[0, 1e-11, 1e8], [0, 1e-11, 3e-11, 1e9, 2e9], [0, 1e-9, 1e12]])
+def test_absurd_steps_overflow_nothing(time):
+    assert nominal_rate(np.array(time)) > 0
+    frames_shown(np.array(time))
+
+
+@pytest.mark.parametrize("fps", [239.75, 23.97, 29.9, 29.98, 59.9, 119.87])
+def test_a_rate_near_one_of_television_is_used_as_given(fps):
+    assert standard_rate(fps) == fps

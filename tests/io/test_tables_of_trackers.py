@@ -426,3 +426,50 @@ def test_live_link_s_table_with_more_columns_has_its_weights_alone(path):
     lines = path.read_text().splitlines()
     path.write_text("\n".join(f"{i or ''},{line}" for i, line in enumerate(lines)))
     assert read_take_file(path).source.names == ARKIT_SHAPES
+
+
+FLAT = POSITIONS.round(4)
+XYZ = ",x,y,z" * 3
+OF_PANDAS = {
+    "names and axes": ["time" + ",chin,chin,chin,lip,lip,lip,brow,brow,brow", XYZ],
+    "once": ["time,chin,,,lip,,,brow,,", XYZ],
+    "a named index": [",chin,chin,chin,lip,lip,lip,brow,brow,brow", XYZ, "time" + "," * 9],
+    "named levels": ["part,chin,,,lip,,,brow,,", "axis" + XYZ, "time" + "," * 9],
+}
+
+
+@pytest.mark.parametrize("kind", OF_PANDAS)
+def test_markers_under_two_lines_of_names(path, kind):
+    path.write_text("\n".join([*OF_PANDAS[kind], *rows_of(POSITIONS, [(t,) for t in SECONDS])]))
+    take = read_take_file(path)
+    assert take.source.names == ("chin", "lip", "brow")
+    np.testing.assert_array_equal(take.source.values, FLAT)
+    np.testing.assert_allclose(take.time, SECONDS)
+
+
+@pytest.mark.parametrize("second", [",jawOpen,smile", "bodyparts,jawOpen,smile"])
+def test_a_second_line_of_names_is_named(path, second):
+    path.write_text(f"time,face,face\n{second}\n0,0.1,0.2\n0.5,0.3,0.4\n")
+    with pytest.raises(InputError, match=r"line 2.*names again, such as 'smile'"):
+        read_take_file(path)
+
+
+@pytest.mark.parametrize("spelling", ["{}_pos_{}", "{}_POS_{}", "{}{}", "{}_t{}", "{}.pos.{}"])
+def test_markers_in_capitals(path, spelling):
+    columns = {
+        spelling.format(name, axis): POSITIONS[:, m, i].round(4)
+        for m, name in enumerate(("LBROW", "CHIN", "RLIP"))
+        for i, axis in enumerate("XYZ")
+    }
+    write(path, {"time": SECONDS, **columns})
+    source = read_take_file(path).source
+    assert source.names == ("LBROW", "CHIN", "RLIP")
+    np.testing.assert_array_equal(source.values, POSITIONS.round(4))
+
+
+def test_timecodes_may_be_of_semicolons_alone(path):
+    codes = [f"01;02;{3 + i // 25:02d};{i % 25:02d}" for i in range(FRAMES)]
+    write(path, {"timecode": codes, **weights()})
+    take = read_take_file(path)
+    assert take.source.names == tuple(NAMES)
+    np.testing.assert_allclose(take.time, np.arange(FRAMES) / 25, atol=1e-6)

@@ -240,3 +240,48 @@ def test_curves_of_facert_keep_all_of_their_names(path, names):
         json.dumps({"fps": 30, "names": ["jawOpen", "time"], "weights": document["weightMat"]})
     )
     assert read_take_file(path).source.names == ("jawOpen",)
+
+
+def points_of(values, **more):
+    """A list of points {x, y, z} of values (M, 3)."""
+    return [{**dict(zip("xyz", xyz, strict=True), **more)} for xyz in values.tolist()]
+
+
+POINTS = 50 + VALUES[:, :6].reshape(FRAMES, 2, 3)
+LANDMARKS = {
+    "objects": points_of,
+    "with a visibility": lambda values: points_of(values, visibility=0.9),
+    "of several faces": lambda values: [points_of(values), points_of(values + 9)],
+    "lists": lambda values: values.tolist(),
+    "beside a head": points_of,
+}
+
+
+@pytest.mark.parametrize("kind", LANDMARKS)
+def test_landmarks_in_a_list_are_markers(path, kind):
+    head = {"head": {"pitch": 0.1, "yaw": 0.2}, "roll": 0.3} if "head" in kind else {}
+    frames = [
+        {"time": t, "landmarks": LANDMARKS[kind](values), **head}
+        for t, values in zip(SECONDS.tolist(), POINTS, strict=True)
+    ]
+    path.write_text(json.dumps(frames))
+    source = read_take_file(path).source
+    assert source.names == ("0", "1")
+    np.testing.assert_array_equal(source.values, POINTS)
+
+
+@pytest.mark.parametrize("key", ["blendshapes", ""])
+def test_landmarks_beside_weights_are_left_out(path, key, caplog):
+    frames = [
+        {"time": t, "landmarks": points_of(POINTS[0]), **({key: row} if key else row)}
+        for t, row in STAMPS
+    ]
+    path.write_text(json.dumps(frames))
+    check(read_take_file(path))
+    assert "'landmarks'" in caplog.text
+
+
+def test_points_in_a_plane_are_no_weights(path):
+    path.write_text(json.dumps([{"time": t, "landmarks": [{"x": 1, "y": t}]} for t, _ in STAMPS]))
+    with pytest.raises(InputError, match="weights or markers"):
+        read_take_file(path)
