@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 ONE_FRAME = 30.0
 """The nominal rate of a single frame."""
@@ -21,16 +21,15 @@ _USUAL = (10.0, 12.0, 15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120
 _LONGEST = 2.0**31  # frames of a gap
 _MOST = 2.0**53  # frames
 _FITS = 2e-4  # the share by which clocks go wrong
+_SHORTEST = 1e-9  # seconds between frames
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Rows that lie evenly where they follow each other."""
+    """An even spacing of rows where they follow each other."""
 
     step: float  # seconds
     error: float  # of the step, a standard deviation
-    frames: IntArray  # from the first row to each, (T,)
-    clean: BoolArray  # steps between rows that take a whole number of frames, (T - 1,)
 
 
 def standard_rate(fps: float) -> float:
@@ -119,7 +118,10 @@ def resolution(time: FloatArray) -> float:
 
 
 def _rises(time: FloatArray) -> bool:
-    return time.ndim == 1 and len(time) > 1 and bool((time[1:] > time[:-1]).all())
+    if time.ndim != 1 or len(time) < 2 or not np.isfinite(time[[0, -1]]).all():
+        return False
+    steps = np.diff(time)
+    return bool((steps > 0).all() and np.quantile(steps, 0.5, method="lower") > _SHORTEST)
 
 
 def _fitted(time: FloatArray) -> _Fit:
@@ -127,18 +129,20 @@ def _fitted(time: FloatArray) -> _Fit:
     steps = np.diff(time)
     median = float(np.quantile(steps, 0.5, method="lower"))
     usual = float(np.mean(steps[(steps >= 0.49 * median) & (steps <= 1.6 * median)]))
-    taken = np.where(steps < 1.6 * usual, 1.0, np.minimum(np.rint(steps / usual), _LONGEST))
-    clean = np.abs(steps / usual - taken) <= np.where(taken == 1, 0.6, 0.15)
+    with np.errstate(over="ignore"):
+        ratios = steps / usual
+    taken = np.where(ratios < 1.6, 1.0, np.rint(np.minimum(ratios, _LONGEST)))
+    clean = np.abs(ratios - taken) <= np.where(taken == 1, 0.6, 0.15)
     frames = np.append(0, np.cumsum(taken))
     run = np.append(0, np.cumsum(~clean))
     x, y = _centred(frames, run), _centred(time, run)
     moment = float(x @ x)
     if not moment:
-        return _Fit(usual, usual, frames.astype(np.int64), clean)
+        return _Fit(usual, usual)
     step = float(x @ y) / moment
     free = max(len(time) - int(run[-1]) - 2, 1)
     error = float(np.sqrt(np.sum((y - step * x) ** 2) / free / moment))
-    return _Fit(step, error, frames.astype(np.int64), clean)
+    return _Fit(step, error)
 
 
 def _centred(values: FloatArray, run: IntArray) -> FloatArray:

@@ -65,3 +65,17 @@ def test_absurd_steps_overflow_nothing(time):
 @pytest.mark.parametrize("fps", [239.75, 23.97, 29.9, 29.98, 59.9, 119.87])
 def test_a_rate_near_one_of_television_is_used_as_given(fps):
     assert standard_rate(fps) == fps
+
+
+@pytest.mark.parametrize("end", [1e22, 1e300])
+@pytest.mark.filterwarnings("error")
+def test_a_gap_of_ages_hides_no_rate(end) -> None:
+    assert nominal_rate(np.append(np.arange(5) / 60, end)) == 60.0
+
+
+@pytest.mark.parametrize(
+    "time", [[0, 0.01, np.inf], [-np.inf, 0, 1], [0, 5e-324, 1], [0, 1e-300, 1]]
+)
+@pytest.mark.filterwarnings("error")
+def test_times_that_cannot_be_have_some_rate_and_no_warning(time) -> None:
+    assert nominal_rate(np.array(time, dtype=np.float64)) > 0
