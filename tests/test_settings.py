@@ -41,6 +41,16 @@ def test_by_default_the_method_decides_how_much_unlabelled_data_it_uses():
     assert {name for name, count in most.items() if count is not None} == {"ssgplvm", "sgplvm"}
 
 
+def test_neighbours_and_latent_dimensions_are_the_papers():
+    """Section 2.2: "k = 8 nearest neighbors for LLE and 8 dimensions for the latent space"."""
+    assert (Settings().neighbours, Settings().latent_dim) == (8, 8)
+
+
+def test_poses_are_meant_less_exactly_than_a_capture_and_more_so_than_their_own_motion():
+    """A variance, of normalised poses, whose largest is 1."""
+    assert 0.1**2 < Settings().target_noise_floor < 0.3**2
+
+
 def test_an_integer_will_do_where_a_number_is_due():
     assert Settings(sigma_c=1).sigma_c == 1
 
