@@ -5,6 +5,7 @@ import pytest
 
 from facert.methods.base import Labelled
 from facert.methods.processes import Basis, FeatureProcess
+from facert.models.gp.hyperparameters import maximise_likelihood
 
 
 @pytest.fixture
@@ -30,3 +31,11 @@ def test_the_process_is_of_poses_less_the_pose_expected_before(frames):
     process = FeatureProcess.learn(Labelled(frames[:20], Y), Basis.plain(frames), mean)
     np.testing.assert_allclose(process(frames[:20])[0], Y, atol=0.05)
     np.testing.assert_allclose(process.process.Y, Y - mean, atol=1e-12)
+
+
+def test_the_kernel_is_the_most_likely_one_of_all_labels(frames):
+    labelled = Labelled(frames[:60], np.sin(frames[:60, :2]))
+    process = FeatureProcess.learn(labelled, Basis.plain(frames), np.zeros(2))
+    features = frames[:60] - frames.mean(axis=0)
+    kernel = maximise_likelihood(features, labelled.Y).kernel
+    np.testing.assert_allclose(process.process.theta, [*kernel.theta, kernel.linear], rtol=1e-6)

@@ -53,6 +53,15 @@ def test_noise_is_not_followed(name):
     assert np.std(predicted - clean[60:]) < 0.6 * np.std(noisy - clean)
 
 
+@pytest.mark.parametrize("name", ["ridge", "pls", "gpr-linear", "svr", "nearest"])
+def test_the_unit_of_the_source_does_not_matter(name):
+    """Also where so much noise asks for a large penalty."""
+    X, Y = linear_data(noise=3.0)
+    frames = linear_data(seed=1)[0]
+    small, large = (fitted(name, unit * X, Y).predict(unit * frames).Y for unit in (1.0, 1e3))
+    np.testing.assert_allclose(large, small, atol=1e-2)
+
+
 def test_each_control_has_its_own_penalty():
     X, Y = linear_data()
     Y[:, 3] = np.random.default_rng(1).normal(size=len(Y))

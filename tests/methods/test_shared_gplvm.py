@@ -7,13 +7,16 @@ import torch
 
 from facert.data.arrays import rms
 from facert.errors import InputError
+from facert.methods import shared_gplvm
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.registry import make_method
 from facert.models.gplvm import staging
 from facert.models.gplvm.source_mapping import SourceMapping
 from facert.models.gplvm.target_mapping import map_to_target
 from facert.models.kernels import KERNELS
+from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
+from facert.models.optim.scg import SCG
 from facert.settings import Settings
 
 QUICK = {"latent_dim": 3, "neighbours": 5, "max_iterations": 40}
@@ -141,6 +144,38 @@ def test_batch_stream_and_device_map_alike(kernel, likelihood):
         np.testing.assert_allclose(one.Y, batch.Y[row : row + 1], atol=1e-4)
     for name in ("Y", "std", "X"):
         np.testing.assert_allclose(getattr(on_device, name), getattr(batch, name), atol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "kind"), [("lbfgs", LBFGS), ("scg", SCG)])
+def test_the_optimiser_is_the_one_of_the_settings(name, kind, monkeypatch):
+    used, train = [], shared_gplvm.train
+
+    def note(module, optimiser, **options):
+        used.append(type(optimiser))
+        return train(module, optimiser, **options)
+
+    monkeypatch.setattr(shared_gplvm, "train", note)
+    fitted(optimizer=name, max_iterations=2)
+    assert used == [kind]
+
+
+@pytest.mark.parametrize("likelihood", ["exact", "vfe"])
+def test_each_view_has_its_own_kernel(likelihood):
+    options = {"likelihood": likelihood, "inducing": 9, "max_iterations": 2}
+    made = fitted(target_kernel="matern-5/2", **options)
+    kernels = type(made.source_.kernel), type(made.target_.kernel)
+    assert kernels == (KERNELS["squared-exponential"], KERNELS["matern-5/2"])
+
+
+def test_a_number_of_huge_variance_is_as_good_as_hidden(method):
+    """And one of none is as good as measured."""
+    frames = make_data()[1].X[:6]
+    hidden, variance = frames.copy(), np.zeros(frames.shape)
+    hidden[:, [2, 5]], variance[:, [2, 5]] = np.nan, 1e9
+    expected, found = method.predict(hidden), method.predict(frames, variance)
+    for name in ("Y", "std"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-5)
+    same(method.predict(frames, 0.0 * variance), method.predict(frames))
 
 
 def test_an_unknown_kernel_is_refused():

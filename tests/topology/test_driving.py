@@ -139,6 +139,21 @@ def test_what_is_carried_turns_with_a_face_that_turns(two_sheets, turn):
     np.testing.assert_allclose(driver.deform(points[None, :72])[0], points, atol=1e-9)
 
 
+def test_what_is_carried_follows_the_vertices_that_are_nearest_to_it(sheet):
+    """Not the far corner, which alone moves."""
+    points, faces = sheet
+    above = points[[0, 1, 8]] + [0.0, 0.0, 0.2]
+    labelled = np.append(LABELLED, [1, 8])
+    driver = FaceDriver(
+        np.vstack([points, above]), np.vstack([faces, [[72, 73, 74]]]), labelled, loose="carry"
+    )
+    given = points[labelled].copy()
+    given[list(labelled).index(71)] += [0.0, 0.0, 3.0]
+    (deformed,) = driver.deform(given[None])
+    assert np.abs(deformed[:72] - points).mean() > 0.1
+    np.testing.assert_allclose(deformed[72:], above, atol=1e-4)
+
+
 def test_radial_functions_need_no_mesh_and_reach_every_part(two_sheets):
     points, faces = two_sheets
     deformed = FaceDriver(points, faces, LABELLED, "rbf-linear").deform(moved(points))

@@ -5,7 +5,12 @@ from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.topology.driving import FaceDriver, smooth_energy
 from facert.topology.solution import Elimination
-from facert.topology.suggested_points import EVEN, rim_vertices, suggest_points
+from facert.topology.suggested_points import (
+    EVEN,
+    _evened,
+    rim_vertices,
+    suggest_points,
+)
 
 
 @pytest.fixture
@@ -78,3 +83,11 @@ def test_bad_input_is_named(rig):
     still = Rig(rig.neutral, 0 * rig.shapes, rig.names, rig.faces)
     with pytest.raises(InputError, match="move something"):
         suggest_points(still, 10)
+
+
+def test_a_shape_sixteen_times_as_large_counts_eight_times_as_much():
+    shape = np.random.default_rng(0).normal(size=(72, 3))
+    columns = _evened(np.stack([shape, 16.0 * shape, 0.0 * shape]))
+    small, large = columns[:, :3], columns[:, 3:]
+    assert columns.shape == (72, 6)  # what never moves tells nothing
+    np.testing.assert_allclose(large, 8.0 * small)

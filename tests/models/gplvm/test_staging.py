@@ -6,6 +6,7 @@ from facert.models.gplvm.fitting import train
 from facert.models.gplvm.initial_latents import align
 from facert.models.gplvm.lle import constraint_matrix, view_rows
 from facert.models.gplvm.module import GaussianView, SharedGPLVM
+from facert.models.gplvm.source_mapping import Observation, SourceMapping
 from facert.models.gplvm.staging import CORE_ALONE, CORE_LABELS, Core, TrainedViews, spread
 from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor
@@ -90,3 +91,22 @@ def test_kernels_in_other_units_are_those_of_the_observations_divided(trained):
     for view, unit, kernel in zip((begin.source, begin.target), units, begin.kernels, strict=True):
         expected = view.kernel.gram(view.Z) / unit.scale**2
         np.testing.assert_allclose(kernel.gram(view.Z), expected, rtol=1e-12)
+
+
+def test_unknown_rows_are_placed_by_source_mapping_as_noisy_as_their_view(views, trained):
+    (X, Y), (core, module) = views, trained
+    source, target = module.posteriors()
+    Z = TrainedViews.at(source, target).latents(X, Y, LABELLED)
+    unknown = np.setdiff1d(np.arange(len(X)), core.rows_x)
+    observed = Observation.of(X[unknown], np.sqrt(source.kernel.noise))
+    expected = SourceMapping(source).solve(observed).z
+    np.testing.assert_allclose(Z[unknown], expected, atol=1e-6)
+
+
+def test_rows_in_other_units_find_the_same_places(views, trained):
+    (X, Y), posteriors = views, trained[1].posteriors()
+    units = Normalisation(np.full(12, 0.3), 3.0), Normalisation(np.full(8, -0.2), 0.2)
+    rows = (unit.apply(view) for unit, view in zip(units, (X, Y), strict=True))
+    found = TrainedViews(*posteriors, *units).latents(*rows, LABELLED)
+    expected = TrainedViews.at(*posteriors).latents(X, Y, LABELLED)
+    np.testing.assert_allclose(found, expected, atol=1e-6)

@@ -147,3 +147,17 @@ def test_a_long_take_in_parts_is_the_take_as_a_whole(motion, noisy, monkeypatch)
     for one, other in zip(motion.smooth(X, SIGMA), whole, strict=True):
         assert one.shape == other.shape
         np.testing.assert_allclose(one, other, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("noise", "forgotten"), [(1.5, False), (0.6, False), (2.5, True), (0.3, True)]
+)
+def test_at_another_noise_by_more_than_twice_the_filter_begins_at_its_prior(noise, forgotten):
+    """It took noise for motion, or motion for noise."""
+    filter_ = _SeriesFilter(np.ones(3), np.full(3, 0.3), 0.1)
+    stepped(filter_, np.random.default_rng(0).normal(size=(30, 3)), [None] * 30)
+    values = filter_._m.copy()
+    filter_.set_noise(0.1 * noise)
+    np.testing.assert_array_equal(filter_._m[0], values[0])
+    assert (filter_._P == filter_._chain.prior).all() == forgotten
+    assert (filter_._m[1] == 0.0).all() == forgotten

@@ -64,3 +64,12 @@ def test_a_smoothed_frame_is_its_factors_and_the_smoothed_rest_of_each_column(ta
     np.testing.assert_allclose(variance[~seen], own[~seen], atol=1e-10)
     # Two layers take each other for noise: what was seen is known at least as well as it was shown.
     np.testing.assert_allclose(variance[seen], np.minimum(own, SIGMA**2)[seen], atol=1e-10)
+
+
+@pytest.mark.parametrize("rate", [0.7, 1.5])
+def test_how_quickly_factors_move_is_found(rate, monkeypatch):
+    monkeypatch.setattr(room, "FACTORS", 2)
+    rng = np.random.default_rng(0)
+    X = processes(600, 2, rate, rng) @ rng.normal(size=(2, 12))
+    X += SIGMA * rng.normal(size=X.shape)
+    np.testing.assert_allclose(Motion.learned(X, SIGMA).rates, rate, rtol=0.3)
