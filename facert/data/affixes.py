@@ -94,7 +94,9 @@ class Affix:
             return None
         found = parsed(name)
         first, last = found[len(self.before)], found[len(found) - len(self.after) - 1]
-        return slice(first.begin, last.end)
+        # Signs at an end that stays are the name's own
+        begin = first.begin if self.before else 0
+        return slice(begin, last.end if self.after else len(composed(name)))
 
 
 NONE = Affix()

@@ -85,13 +85,10 @@ class _Spellings:
     """Positions by name: as it is spelled, in any form of Unicode, or else in any spelling."""
 
     def __init__(self, names: Mapping[int, str]) -> None:
-        self._exact = {name: place for place, name in names.items()}
-        self._others = [(form, _different(form, names)) for form in (composed, folded)]
+        self._forms = [(form, _different(form, names)) for form in (str, composed, folded)]
 
     def find(self, name: str) -> int | None:
-        if name in self._exact:
-            return self._exact[name]
-        found = (places.get(form(name)) for form, places in self._others)
+        found = (places.get(form(name)) for form, places in self._forms)
         return next((place for place in found if place is not None), None)
 
 

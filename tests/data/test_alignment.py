@@ -121,6 +121,13 @@ def test_names_without_the_affix_match_beside_those_with_it():
     assert match([*FEW, "HeadYaw"], among, "names").tolist() == [0, 1, 2, 3, 4, 5, 6]
 
 
+@pytest.mark.parametrize("prefix", ["Face:", "bs_"])
+def test_names_that_differ_in_signs_alone_stay_apart_behind_a_prefix(prefix):
+    names = ("lip-1", "lip+1", "cheek", "cheek.", "jaw", "brow", "lid")
+    assert match(names, spelled(names, prefix), "names").tolist() == list(range(7))
+    assert match(spelled(names, prefix), names, "names").tolist() == list(range(7))
+
+
 def test_subjects_of_markers():
     wanted, among = ["LBRO", "RBRO", "1"], ["Actor1:RBRO", "Actor1:LBRO", "Actor1:1", "*12"]
     assert match(wanted, among, "names").tolist() == [1, 0, 2]
