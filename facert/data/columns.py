@@ -192,7 +192,7 @@ def _rows_without(column: FloatArray, role: Role) -> BoolArray:
     return np.zeros(len(column), dtype=np.bool_)
 
 
-def learnable(take: Take, keep: Sequence[str] = ()) -> Take:
+def learnable(take: Take, keep: Sequence[str] = (), sparse: bool = False) -> Take:
     """A foreign take with its weights alone: see `weight_columns`. One of markers is as it was.
 
     Raises `InputError` when no weight remains.
@@ -200,7 +200,7 @@ def learnable(take: Take, keep: Sequence[str] = ()) -> Take:
     source = take.source
     if source.kind == "markers":
         return take
-    found = weight_columns(source.names, source.values, take.time, keep)
+    found = weight_columns(source.names, source.values, take.time, keep, sparse=sparse)
     if len(found.columns) == len(source.names) and not found.absent.any():
         return take
     values = source.values[:, found.columns].copy()

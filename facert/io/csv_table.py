@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.columns import require_there
+from facert.data.columns import learnable, require_there
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_columns
 from facert.errors import InputError, reading
@@ -53,14 +53,16 @@ _QUOTED = re.compile(r'[",\r\n]')
 _NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 
 
-def read_csv_take(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Take:
-    """Read a CSV file by its header: one of Live Link Face, or else a table."""
+def read_csv_take(
+    path: Path, fps: float | None = None, keep: Sequence[str] = (), sparse: bool = False
+) -> Take:
+    """Read a CSV file by its header: one of Live Link Face, or else a table; see `read_table`."""
     with reading(path):
         header = read_header(path)
         if not is_livelink(header):
-            return read_table(path, fps, keep)
+            return read_table(path, fps, keep, sparse)
         require_there(keep, header)
-        return read_livelink(path, fps)
+        return learnable(read_livelink(path, fps), keep, sparse)
 
 
 def read_table(
@@ -93,10 +95,10 @@ def read_table(
         return take_of_table(table_of_lines(header, rows), Reading(fps, tuple(keep), sparse))
 
 
-def is_mixed(path: Path) -> bool:
-    """Whether columns of a table may be no weights: unless its first cell states what they are."""
+def is_marked(path: Path) -> bool:
+    """Whether the first cell of a table states what its columns are."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return not _is_marked(file.read(2 * _LONGEST))
+        return _is_marked(file.read(2 * _LONGEST))
 
 
 def write_table(take: Take, path: Path, overwrite: bool = False) -> None:

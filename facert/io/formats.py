@@ -8,7 +8,6 @@ from inspect import signature
 from pathlib import Path
 from typing import Literal
 
-from facert.data.columns import learnable
 from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig
@@ -41,6 +40,7 @@ def read_any(
     or_fps: float | None = None,
     keep: Sequence[str] = (),
     align: bool = False,
+    sparse: bool = False,
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -60,6 +60,8 @@ def read_any(
         Columns of a table that are weights, though they look like a clock, a counter or a flag.
     align : bool
         Move shapes into register with the neutral where they are meshes; else they are logged.
+    sparse : bool
+        Whether the rows of a foreign table or track are poses of single frames, far apart.
 
     Raises
     ------
@@ -83,15 +85,12 @@ def read_any(
         raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
     fps = None if fps is None else standard_rate(fps)
     options = {"target": target, "shapes": shapes, "fps": fps or or_fps, "keep": keep}
-    options |= {"align": align}
+    options |= {"align": align, "sparse": sparse}
     taken = signature(reader).parameters.keys() & options.keys()
     if align and "align" not in taken:
         fix = "Leave it out: the shapes are displacements."
         raise InputError("--align-shapes", "a folder of OBJ files", held, fix, where=str(path))
     read: Take | Rig = reader(path, **{name: options[name] for name in taken})
-    if isinstance(read, Take) and found.mixed and function(found.mixed)(path):
-        with reading(path):
-            read = learnable(read, keep)
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
 

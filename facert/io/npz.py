@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import IO, Any, Literal
@@ -26,6 +26,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray, require_shape
+from facert.data.columns import learnable
 from facert.data.rate import nominal_rate, standard_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
@@ -118,13 +119,17 @@ def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
         return "rig" if "neutral" in archive and "faces" in archive else "take"
 
 
-def is_mixed(_path: Path) -> bool:
-    """Whether weights of a track may be a clock, a counter or a flag: of any, by who wrote it."""
-    return True
-
-
-def read_npz_take(path: Path, target: str | None = None, fps: float | None = None) -> Take:
+def read_npz_take(
+    path: Path,
+    target: str | None = None,
+    fps: float | None = None,
+    keep: Sequence[str] = (),
+    sparse: bool = False,
+) -> Take:
     """Read a track; `fps` is for a file that does not state it.
+
+    Weights that are a clock, a counter or a flag are left out, unless they are in `keep`; `sparse`
+    tracks are poses of single frames.
 
     `target` is one of several; one alone, or none, needs no choice, and `NO_TARGET` is none of
     them.
@@ -137,7 +142,8 @@ def read_npz_take(path: Path, target: str | None = None, fps: float | None = Non
         key = None if target == NO_TARGET else _choose(_targets(archive), target, "--target")
         params = None if key is None else archive.numbers(key)
         controls = None if key is None else Controls(archive.names(_names_key(key, archive)))
-        return Take(time=time, source=source, controls=controls, params=params, fps=rate)
+        take = Take(time=time, source=source, controls=controls, params=params, fps=rate)
+        return learnable(take, keep, sparse)
 
 
 def targets_of(path: Path) -> dict[str, tuple[str, ...]]:

@@ -18,12 +18,13 @@ from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.csv_table import is_mixed, read_table
+from facert.io.csv_table import is_marked
 from facert.io.formats import read_any, require_take
-from facert.io.lines import read_csv, read_header, to_numbers
+from facert.io.lines import read_csv, read_header
 from facert.io.livelink import is_livelink
-from facert.io.table import table_of_lines
+from facert.io.table import Table, table_of_lines
 from facert.io.table_take import controls_of
+from facert.io.tracker_json import read_json_table
 
 log = logging.getLogger("facert")
 
@@ -35,7 +36,7 @@ _FRAMES = 5.0  # rows a second of a table, which are frames and not poses now an
 
 
 def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Poses:
-    """Read poses: of a CSV with a column ``frame``, its rows; else of a take, by their times.
+    """Read poses: of a table or JSON with a column ``frame``, its rows; else of a take, by time.
 
     `fps` is the rate of the recording, whatever the file states. Columns of a table that are no
     controls, such as a confidence, are left out, and the log names them; those in `keep` stay.
@@ -45,21 +46,26 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
     """
     path = Path(path)
     with reading(path):
-        if path.suffix.lower() in _TABLES and not is_livelink(header := read_header(path)):
-            poses = _read_table(path, header, fps, keep)
+        table = _numbered_table(path)
+        if table is not None:
+            poses = _of_numbers(table, keep)
         else:
-            take = _at_rate(read_any(path, kind="take", or_fps=fps, keep=keep), path, fps)
+            take = read_any(path, kind="take", or_fps=fps, keep=keep, sparse=True)
+            take = _at_rate(take, path, fps)
             _require_set(take, path)
             poses = poses_of(take)
         return replace(poses, where=str(path))
 
 
-def _read_table(path: Path, header: Sequence[str], fps: float | None, keep: Sequence[str]) -> Poses:
-    """Poses of a table, by its column ``frame`` or else by time."""
-    place = _frame_column(header) if is_mixed(path) else None
-    if place is not None:
-        return _read_numbered(path, place, keep)
-    return poses_of(_at_rate(read_table(path, fps, keep, sparse=True), path, fps))
+def _numbered_table(path: Path) -> Table | None:
+    """The table in a file, if it numbers the frames."""
+    ending = path.suffix.lower()
+    if ending == ".json":
+        table = read_json_table(path)
+        return None if table is None or _frame_column(table.names) is None else table
+    if ending not in _TABLES or is_livelink(header := read_header(path)) or is_marked(path):
+        return None
+    return None if _frame_column(header) is None else table_of_lines(*read_csv(path))
 
 
 def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
@@ -101,14 +107,18 @@ def _frame_column(header: Sequence[str]) -> int | None:
     return lower.index(_FRAME) if _FRAME in lower else next(numbering, None)
 
 
-def _read_numbered(path: Path, place: int, keep: Sequence[str]) -> Poses:
-    header, rows = read_csv(path)
-    require_there(keep, header)
-    table = table_of_lines(header, rows)
-    numbers = to_numbers(rows, header, [place])[:, 0]
+def _of_numbers(table: Table, keep: Sequence[str]) -> Poses:
+    """Poses of a table that numbers their frames."""
+    require_there(keep, table.names)
+    place = _frame_column(table.names)
+    assert place is not None  # as was asked before
+    numbers = table.numbers[:, place]
     odd = np.flatnonzero(~((numbers == np.rint(numbers)) & (np.abs(numbers) < MAX_FRAMES)))
     if len(odd):
-        row = rows[odd[0]]
-        raise row.error(header[place], "a frame's number, whole and from 0", repr(row.cells[place]))
+        expected, found = "a frame's number, whole and from 0", f"{numbers[odd[0]]:.10g}"
+        found = "a text" if place in table.texts else "a blank" if found == "nan" else found
+        raise table.error(int(odd[0]), place, expected, found)
+    if table.names[place].strip().lower() != _FRAME:
+        log.info("%r is taken for the number of the frame in the take, from 0", table.names[place])
     names, values = controls_of(table, place, keep)
     return Poses(names=names, values=values, frames=numbers.astype(np.int64))

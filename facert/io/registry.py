@@ -43,8 +43,6 @@ class Format:
     missing: Missing = ""
     """What stands for missing frames where a file is played row by row at its rate, so that rows
     have to be even: the frame before, or a row that says so; empty where rows have their times."""
-    mixed: str = ""
-    """From the path to whether columns of that file may be no weights: a clock, a flag."""
     mark: str = ""
     """From the path to whether facert wrote that very file; without it, facert writes none."""
     about: str = ""
@@ -84,7 +82,6 @@ FORMATS = (
         (".csv",),
         read={"take": "csv_table.read_csv_take"},
         write={"take": "csv_table.write_table"},
-        mixed="csv_table.is_mixed",
         mark="csv_table.bears_mark",
         about=" of Live Link Face, another tracker or plain",
         reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y "
@@ -96,7 +93,6 @@ FORMATS = (
         (".json",),
         read={"take": "tracker_json.read_json_take"},
         write={"take": "curves.write_curves"},
-        mixed="tracker_json.is_mixed",
         missing="held",
         mark="curves.bears_mark",
         about=" of Audio2Face or a tracker",
@@ -114,7 +110,6 @@ FORMATS = (
     Format(
         (".tsv", ".tab"),
         {"take": "csv_table.read_csv_take"},
-        mixed="csv_table.is_mixed",
         reads="the same as `.csv`, between tabs",
     ),
     Format((".c3d",), {"take": "c3d.read_c3d"}, reads="markers"),
@@ -163,7 +158,6 @@ FORMATS = (
         read={"take": "npz.read_npz_take", "rig": "npz.read_npz_rig"},
         kind_of="npz.kind_of",
         targets="npz.targets_of",
-        mixed="npz.is_mixed",
         reads="tracks: `markers`, `marker_names`, `time`, `fps`, any targets `KEY` with "
         "`KEY_names` (choose with `--target KEY`); rigs: `neutral`, `faces`, `deltas`, `names`, "
         "or several `KEY_deltas`, `KEY_names` (choose with `--shapes KEY`)",

@@ -12,11 +12,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.column_names import names_face, role_of_name
+from facert.data.columns import learnable
 from facert.data.take import Take
 from facert.data.text import listed
 from facert.errors import InputError, reading
@@ -34,29 +36,42 @@ _AXES = frozenset(("x", "y", "z", "w", "h", "width", "height", "pitch", "yaw", "
 _OWN = re.compile(
     r'\{("createdBy": "[^"]*", )?"exportFps": [^,]*, "trackPath": "", "startTimecode": '
 )
-_HEAD = 256
 _LARGE, _SPARSE = 2**20, 20  # cells; of such a table one in so many must be filled
 
 
-def read_json_take(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Take:
-    """Read a JSON file as a take whose source is weights.
+def read_json_take(
+    path: Path, fps: float | None = None, keep: Sequence[str] = (), sparse: bool = False
+) -> Take:
+    """Read a JSON file as a take whose source is weights, or markers.
 
-    `fps` is for a file that states neither times nor a rate.
+    `fps` is for a file that states neither times nor a rate; `sparse` frames are poses of single
+    ones, far apart. What is a clock, a counter or a flag is left out, unless it is in `keep`, or
+    facert wrote the file.
 
     Raises `InputError` naming the file and the key or frame that is at fault.
     """
     with reading(path):
-        document = parsed(read_text(path))
-        if isinstance(document, dict) and holds_curves(document) and not has_times(document):
-            return take_of_curves(document, fps)
+        text = read_text(path)
+        document = parsed(text)
+        if _are_curves(document):
+            take = take_of_curves(document, fps)
+            return take if _OWN.match(text) else learnable(take, keep, sparse)
         table = _table(_or_points(frames_of(document)))
-        return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep)))
+        return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep), sparse))
 
 
-def is_mixed(path: Path) -> bool:
-    """Whether numbers in a JSON file may be no weights: unless facert wrote it."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return _OWN.match(file.read(_HEAD)) is None
+def read_json_table(path: Path) -> Table | None:
+    """The frames of a JSON file as a table; None where it holds curves.
+
+    Raises `InputError` as `read_json_take` does.
+    """
+    with reading(path):
+        document = parsed(read_text(path))
+        return None if _are_curves(document) else _table(_or_points(frames_of(document)))
+
+
+def _are_curves(document: Any) -> bool:
+    return isinstance(document, dict) and holds_curves(document) and not has_times(document)
 
 
 def _or_points(frames: Sequence[Frame]) -> Sequence[Frame]:

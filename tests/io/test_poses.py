@@ -47,3 +47,54 @@ def test_a_table_with_semicolons_and_decimal_commas_names_frames(tmp_path: Path)
     poses = read_poses(path)
     np.testing.assert_array_equal(poses.frames, [12, 4])
     np.testing.assert_array_equal(poses.values, [[0.1, 0.2], [0, 1]])
+
+
+FEW = {
+    "count": [0.0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1],
+    "confidence": [0.9] * 12,
+    "MBP": [0.0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 0, 0],
+    "ramp": np.linspace(0, 1, 12).tolist(),
+    "percent": [10.0 * i for i in range(12)],
+}
+AT = [3, 17, 21, 50, 55, 81, 90, 120, 140, 150, 177, 200]
+KEPT = ("MBP", "ramp", "percent")
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize("key", ["frame", "time"])
+def test_frames_of_json_are_few_poses_as_rows_of_a_table_are(tmp_path, key, nested) -> None:
+    path = tmp_path / "poses.json"
+    rows = [dict(zip(FEW, row, strict=True)) for row in zip(*FEW.values(), strict=True)]
+    clock = [frame if key == "frame" else frame / 10 for frame in AT]
+    frames = [
+        {key: at, **({"weights": row} if nested else row)}
+        for at, row in zip(clock, rows, strict=True)
+    ]
+    path.write_text(json.dumps(frames))
+    poses = read_poses(path)
+    assert poses.names == KEPT
+    np.testing.assert_array_equal(poses.values[:, 0], FEW["MBP"])
+    np.testing.assert_array_equal(poses.frames if key == "frame" else poses.time, clock)
+
+
+def test_a_track_of_few_poses_is_read_as_they_are(tmp_path: Path) -> None:
+    path = tmp_path / "poses.npz"
+    values = np.array([*FEW.values()]).T
+    np.savez(path, weights=values, weight_names=[*FEW], time=np.array(AT) / 10)
+    assert read_poses(path).names == KEPT
+
+
+@pytest.mark.parametrize("number", [None, 1.5, "late"])
+def test_frames_of_json_have_whole_numbers(tmp_path: Path, number) -> None:
+    path = tmp_path / "poses.json"
+    path.write_text(json.dumps([{"frame": 3, "jaw": 0.1}, {"frame": number, "jaw": 0.1}]))
+    with pytest.raises(InputError, match=r"poses\.json: frame \d, column frame"):
+        read_poses(path)
+
+
+def test_another_number_of_the_frame_is_told(tmp_path: Path, caplog) -> None:
+    caplog.set_level("INFO", "facert")
+    path = tmp_path / "poses.csv"
+    path.write_text("frame_number,jaw\n3,0.5\n4,0.1\n")
+    assert read_poses(path).frames.tolist() == [3, 4]
+    assert "'frame_number' is taken for the number of the frame in the take, from 0" in caplog.text
