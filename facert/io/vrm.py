@@ -9,6 +9,7 @@ moves a node for each expression: its x is the weight.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -27,16 +28,25 @@ class Bind:
 
 
 def expressions_of(root: dict[str, Any]) -> dict[str, list[Bind]]:
-    """The expressions of an avatar that move its mesh, by name; none of another glTF file."""
+    """The expressions of an avatar that move its mesh, by name; none of another glTF file.
+
+    Those of one name are numbered from the second on.
+    """
     extensions = root.get("extensions", {})
     if "VRMC_vrm" in extensions:
         found = _of_version_1(root, extensions["VRMC_vrm"])
     else:
         found = _of_version_0(extensions.get("VRM", {}))
     expressions: dict[str, list[Bind]] = {}
+    count: Counter[str] = Counter()
     for name, binds in found:
-        if binds:
-            expressions.setdefault(name, binds)
+        if not binds:
+            continue
+        free = name
+        while free in expressions:
+            count[name] += 1
+            free = f"{name}_{count[name] + 1}"
+        expressions[free] = binds
     return expressions
 
 

@@ -168,3 +168,16 @@ def test_a_vrm_animation_is_a_take_of_expressions(tmp_path: Path, interpolation:
     take = read_take_file(path)
     assert take.source.names == ("aa", "jawOpen")
     np.testing.assert_allclose(take.source.values, [[0, 1], [0.5, 1], [1, 0]])
+
+
+def test_expressions_of_one_name_are_numbered(tmp_path: Path) -> None:
+    groups = [
+        {"name": "A", "presetName": "a", "binds": [bind(0, 0, 100)]},
+        {"name": "a", "presetName": "unknown", "binds": [bind(0, 1, 100)]},
+        {"name": "a_2", "binds": [bind(1, 0, 100)]},
+        {"name": "a", "binds": [bind(1, 0, 50)]},
+    ]
+    path = avatar(tmp_path / "a.vrm", {"VRM": {"blendShapeMaster": {"blendShapeGroups": groups}}})
+    rig = read_rig_file(path, "expressions")
+    assert rig.names == ("a", "a_2", "a_2_2", "a_3")
+    np.testing.assert_allclose(rig.shapes[1], [[0, 0, 2]] * 3 + [[0, 0, 0]] * 3)
