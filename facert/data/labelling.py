@@ -30,6 +30,8 @@ class Poses:
     """Seconds in the take's time, (n,); or"""
     frames: IntArray | None = None
     """the numbers of the frames, from 0, (n,)."""
+    of_clock: bool = False
+    """Whether the time is that of the recorder's clock, and not from the take's beginning."""
     limits: FloatArray | None = None  # (P, 2)
     where: str = "poses"
     """The file or argument that they are from, for messages."""
@@ -83,15 +85,37 @@ def _by_number(take: Take, poses: Poses) -> IntArray:
 def _by_time(take: Take, poses: Poses) -> IntArray:
     """Index of the frame nearest in time to each pose."""
     assert poses.time is not None
-    frames = nearest_frames(take.time, poses.time)
-    distance = np.abs(take.time[frames] - poses.time)
-    astray = np.flatnonzero(~(distance <= 0.5 / take.fps + 1e-6))
+    time = _in_take(take, poses)
+    frames, distance = _nearest(take, time)
+    astray = np.flatnonzero(~(distance <= 0))
     if len(astray):
-        far, row = poses.time[astray[0]], frames[astray[0]]
-        expected = f"within half a frame of one of the take, such as {take.time[row]:.3f} s"
+        row, zero = astray[0], poses.time[astray[0]] - time[astray[0]]
+        expected, near = "within half a frame of one of the take", take.time[frames[row]] + zero
         fix = "Count seconds as the take does, or give a column frame."
-        raise InputError("time of the poses", expected, f"{far:.3f} s", fix)
+        found = f"{poses.time[row]:.3f} s"
+        raise InputError("time of the poses", f"{expected}, such as {near:.3f} s", found, fix)
     return frames
+
+
+def _in_take(take: Take, poses: Poses) -> FloatArray:
+    """Times of the poses from the take's beginning, where they are those of its clock as well."""
+    assert poses.time is not None
+    start = take.clock_start
+    by_clock = poses.time - start
+    if poses.of_clock or not start:
+        return by_clock
+    fits, fits_clock = ((_nearest(take, one)[1] <= 0).all() for one in (poses.time, by_clock))
+    if fits_clock:
+        taken = f"from its first frame on, not by its clock, which begins at {start:.10g} s"
+        taken = taken if fits else f"by the take's clock, which begins at {start:.10g} s"
+        log.warning("%s: times of the poses are taken %s", poses.where, taken)
+    return by_clock if fits_clock and not fits else poses.time
+
+
+def _nearest(take: Take, time: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The frames nearest to times (n,), and the seconds by which these are too far from them."""
+    frames = nearest_frames(take.time, time)
+    return frames, np.abs(take.time[frames] - time) - (0.5 / take.fps + 1e-6)
 
 
 def _require_different(frames: IntArray) -> None:

@@ -116,7 +116,7 @@ def counted_at(take: Take, fps: float) -> Take:
         return replace(take, fps=fps, start_timecode=start)
     log.info("the file's times show %.6g frames/s: counted at %.6g", shown, fps)
     time = (take.time[0] * shown + frames) / fps
-    return replace(take, time=time, fps=fps, start_timecode=start)
+    return replace(take, time=time, fps=fps, start_timecode=start, clock_start=0.0)
 
 
 def _placed(take: Take, places: IntArray, fps: float) -> Take:

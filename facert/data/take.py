@@ -147,6 +147,8 @@ class Take:
         Unit of the marker positions, e.g. ``"cm"``; empty when unknown.
     start_timecode, up_axis : str
         As recorded; empty when unknown.
+    clock_start : float
+        Seconds on the recorder's clock that are 0 in `time`; 0 where `time` is that clock.
 
     Raises
     ------
@@ -165,6 +167,7 @@ class Take:
     start_timecode: str = ""
     up_axis: str = ""
     created_by: str = field(default="")
+    clock_start: float = 0.0
 
     def __post_init__(self) -> None:
         time = float_array(self.time, "/time")
@@ -172,6 +175,9 @@ class Take:
         require_time(time, frames, self.fps)
         for name in ("units", "start_timecode", "up_axis", "created_by"):
             require_plain(getattr(self, name), f"attribute {name}")
+        if not np.isfinite(self.clock_start):
+            expected, found = "seconds on the recorder's clock", f"{self.clock_start}"
+            raise InputError("attribute clock_start", expected, found, "Correct or remove it.")
         set_fields(self, time=frozen(time))
         for name, rows in (("params", frames), ("std", frames), ("animation", None)):
             set_fields(self, **{name: self._poses(name, rows)})

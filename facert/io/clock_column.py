@@ -21,8 +21,8 @@ from facert.data.column_names import (
     unit_of_name,
 )
 from facert.data.columns import rises
-from facert.data.rate import nominal_rate
-from facert.data.timecode import TICKS
+from facert.data.rate import nominal_rate, whole_count
+from facert.data.timecode import LIVE_LINK_RATE, TICKS, has_thousandths, parse_timecode
 from facert.data.timecode_column import read_timecodes
 from facert.errors import InputError
 from facert.io.clock_text import codes_of_texts, is_time, seconds_of_texts
@@ -78,7 +78,7 @@ def clock_of(table: Table, fps: float | None = None, sparse: bool = False) -> Cl
     if column is None:
         return _even(table, fps)
     if column in table.texts:
-        return _text_clock(table, column, fps)
+        return _text_clock(table, column, fps, sparse)
     _require_observed(table, column)
     if _counts_frames(table, column):
         return _frame_clock(table, column, fps)
@@ -204,7 +204,7 @@ def _number_clock(table: Table, column: int, sparse: bool) -> Clock:
     origin = 0.0 if plain else float(values[0])
     seconds = put_together((values - origin) * unit, table.numbers)
     if not plain:
-        start = f", {origin:.10g} for 0" if origin else ""
+        start = f", {origin:.10g} for 0" if origin and not sparse else ""
         log.info("%r is taken for %s%s; --in-fps overrules it", name, _UNITS[unit][0], start)
     if not sparse:
         _warn_of_rate(name, values, seconds)
@@ -263,7 +263,7 @@ def _warn_of_rate(name: str, values: FloatArray, seconds: FloatArray) -> None:
         log.warning(text + "rate with --in-fps", name)
 
 
-def _text_clock(table: Table, column: int, fps: float | None) -> Clock:
+def _text_clock(table: Table, column: int, fps: float | None, sparse: bool) -> Clock:
     """The clock of a column of text: dates, times of the day, or timecodes."""
     name, texts = table.names[column], table.texts[column]
     for row, text in enumerate(texts):
@@ -271,7 +271,8 @@ def _text_clock(table: Table, column: int, fps: float | None) -> Clock:
             found = repr(text[:40]) if text else "a blank"
             raise table.error(row, column, "a time in numbers, as HH:MM:SS.mmm or a date", found)
     if codes_of_texts(texts):
-        return _code_clock(table, column, fps)
+        code_clock = _counted_clock if sparse else _code_clock
+        return code_clock(table, column, fps)
     seconds = seconds_of_texts(texts)
     log.info("%r is taken for times of the clock, from the first row on", name)
     time = put_together(seconds - seconds[0], table.numbers)
@@ -286,3 +287,19 @@ def _code_clock(table: Table, column: int, fps: float | None) -> Clock:
     time = put_together(clock.seconds, table.numbers)
     rate = nominal_rate(time)
     return Clock(time, rate, column, clock.first_ticks / TICKS, clock.start(rate))
+
+
+def _counted_clock(table: Table, column: int, fps: float | None) -> Clock:
+    """The clock of timecodes of single frames, which do not show what FF count."""
+    name, texts = table.names[column], table.texts[column]
+    if fps is None and not any(map(has_thousandths, texts)):
+        fix = "Give --in-fps, the rate of the recording, or a column frame."
+        raise InputError(f"column {name}", "how many FF make a second", "timecodes alone", fix)
+    count = LIVE_LINK_RATE if fps is None or has_thousandths(texts[0]) else whole_count(fps)
+    ticks = [parse_timecode(text, count) for text in texts]
+    if None in ticks:
+        row = ticks.index(None)
+        raise table.error(row, column, f"a timecode of {count} frames a second", repr(texts[row]))
+    seconds = np.array(ticks, dtype=np.float64) / TICKS
+    time = seconds - seconds[0]
+    return Clock(time, nominal_rate(time), column, float(seconds[0]))

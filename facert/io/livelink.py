@@ -89,6 +89,7 @@ def read_livelink(path: Path, fps: float | None = None) -> Take:
             source=Source(values[kept], _canonical_columns(header[2:])),
             fps=rate,
             start_timecode=clock.start(rate),
+            clock_start=clock.first_ticks / TICKS,
         )
 
 

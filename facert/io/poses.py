@@ -54,7 +54,15 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
             take = _at_rate(take, path, fps)
             _require_set(take, path)
             poses = poses_of(take)
+            if take.clock_start and _has_column_of_times(path):
+                poses = replace(poses, time=take.time + take.clock_start, of_clock=True)
         return replace(poses, where=str(path))
+
+
+def _has_column_of_times(path: Path) -> bool:
+    """Whether the first pose's time in a file is not where a recording begins."""
+    ending = path.suffix.lower()
+    return ending == ".json" or (ending in _TABLES and not is_livelink(read_header(path)))
 
 
 def _numbered_table(path: Path) -> Table | None:
@@ -76,8 +84,8 @@ def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
     take = require_take(found, path)
     if fps is None or abs(take.fps - standard_rate(fps)) <= 1e-6 * fps:
         return take
-    table = path.suffix.lower() in _TABLES and not is_livelink(read_header(path))
-    if frames_shown(take.time) is None or (table and take.fps < _FRAMES):
+    few = take.fps < _FRAMES and _has_column_of_times(path)
+    if few or frames_shown(take.time) is None:
         log.info("%s: the times of its poses stay: --in-fps counts frames", path.name)
         return take
     return counted_at(take, fps)

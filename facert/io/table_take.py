@@ -54,8 +54,6 @@ def take_of_table(table: Table, how: Reading) -> Take:
     require_there(how.keep, table.names)
     table = _one_subject(table)
     clock = clock_of(table, how.fps, how.sparse)
-    if how.sparse and clock.origin:
-        raise _of_another_clock(table, clock)
     table, clock = _without_repeats(table, clock)
     columns = _columns(table, clock.column, how.keep)
     names, values = [table.names[column] for column in columns], table.numbers[:, columns]
@@ -69,6 +67,7 @@ def take_of_table(table: Table, how: Reading) -> Take:
         fps=clock.rate,
         units="" if markers is None else markers.unit,
         start_timecode=clock.start_timecode,
+        clock_start=clock.origin,
     )
 
 
@@ -81,13 +80,6 @@ def controls_of(
     found = weight_columns(names, values, table.numbers[:, frames], keep, sparse=True)
     values[found.absent] = np.nan
     return tuple(names[c] for c in found.columns), values[:, found.columns]
-
-
-def _of_another_clock(table: Table, clock: Clock) -> InputError:
-    """The error for poses at times that begin elsewhere than their take's."""
-    name = "" if clock.column is None else table.names[clock.column]
-    expected, found = "seconds of the take, from 0", f"a clock that begins at {clock.origin:.10g} s"
-    return InputError(f"column {name}", expected, found, "Add a column frame, or time.")
 
 
 @contextmanager

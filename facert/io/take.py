@@ -14,7 +14,7 @@
 ``/target/std``     (T, P)                 optional: predictive standard deviation of the params
 ``/animation/params`` (n, P)               optional: poses without a source frame
 attributes                                 format, format_version, fps, units, created_by,
-                                           optional start_timecode, up_axis
+                                           optional start_timecode, up_axis, clock_start
 ==================  =====================  =========================================================
 
 ``/source/std``, ``/source/filled`` and ``/source/head`` are written beside a take for who looks for
@@ -68,6 +68,7 @@ def read_take(path: Path) -> Take:
             start_timecode=file.text_attribute("start_timecode"),
             up_axis=file.text_attribute("up_axis"),
             created_by=file.text_attribute("created_by"),
+            clock_start=file.number_attribute("clock_start", 0.0),
         )
 
 
@@ -124,6 +125,7 @@ def write_take(
         file.attribute("units", take.units)
         file.attribute("start_timecode", take.start_timecode)
         file.attribute("up_axis", take.up_axis)
+        file.attribute("clock_start", take.clock_start or "")
         file.array("/time", take.time)
         _write_source(file, take.source)
         _write_target(file, take)

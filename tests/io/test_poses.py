@@ -98,3 +98,9 @@ def test_another_number_of_the_frame_is_told(tmp_path: Path, caplog) -> None:
     path.write_text("frame_number,jaw\n3,0.5\n4,0.1\n")
     assert read_poses(path).frames.tolist() == [3, 4]
     assert "'frame_number' is taken for the number of the frame in the take, from 0" in caplog.text
+
+
+def test_times_of_json_are_no_frames_to_be_counted(tmp_path: Path) -> None:
+    path = tmp_path / "poses.json"
+    path.write_text(json.dumps([{"time": t, "jaw": t / 9} for t in (1.0, 2.0, 3.0, 4.0)]))
+    np.testing.assert_array_equal(read_poses(path, 24).time, [1, 2, 3, 4])
