@@ -22,10 +22,10 @@ from facert.data.spelling import (
 )
 
 _STRONG = ":|/\\"
-"""What parts a namespace or a path from a name, and no two words of a name."""
+"""Signs that part a namespace or a path from a name, and never two words of a name."""
 _MOST_FACIAL = 0.5
 _MANY = 8
-"""Names that share no word of their own: fewer may be all the corners, or all that opens."""
+"""So many names share no word of their own; fewer may be all the corners, or all that opens."""
 _KINDS = {"bs", "bsnode", "blend", "blendshape", "blendshapes", "ctl", "ctrl", "control"}
 _KINDS |= {"controls", "curve", "expression", "expressions", "face", "geo", "geometry", "grp"}
 _KINDS |= {"head", "mesh", "morph", "morpher", "node", "rig", "shape", "shapes", "target"}
@@ -51,14 +51,14 @@ _PLACES |= {
 
 @dataclass(frozen=True, slots=True)
 class Affix:
-    """What a name begins and ends with: so many words of it, and how that is spelled there."""
+    """The words that a name begins and ends with beside its own."""
 
     before: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words of it."""
+        """All of them."""
         return self.before + self.after
 
     @property
@@ -72,7 +72,7 @@ class Affix:
         return any(word in SIDES or word in _PLACES for word in self.words)
 
     def core(self, name: str) -> str | None:
-        """The name without it; None where the name has it not, or nothing else."""
+        """The name without it; None where the name does not have it, or has nothing else."""
         span = self._span(name)
         return None if span is None else composed(name)[span]
 
@@ -83,7 +83,7 @@ class Affix:
         return composed(name)[: span.start], composed(name)[span.stop :]
 
     def own_words(self, name: str) -> tuple[str, ...]:
-        """The words of a name without it; none where the name has it not, or nothing else."""
+        """The words of a name without it; none where the name lacks it, or has nothing else."""
         found = words(name)
         begin, end = len(self.before), len(found) - len(self.after)
         has = found[:begin] == self.before and found[max(end, 0) :] == self.after
@@ -122,7 +122,7 @@ def without_affix(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def shared_affixes(names: Sequence[str], share: float = 1.0) -> list[Affix]:
-    """All that at least so many of the names begin and end with, the longest first."""
+    """The affixes that at least this share of the names have, the longest first."""
     texts = [words(name) for name in names]
     befores = _common(texts, share, _MOST_BEFORE)
     turned = _common([one[::-1] for one in texts], share, _MOST_AFTER)
@@ -132,7 +132,7 @@ def shared_affixes(names: Sequence[str], share: float = 1.0) -> list[Affix]:
 
 
 def cores_of(affix: Affix, names: Sequence[str]) -> tuple[str, ...] | None:
-    """The names without an affix; None where one has it not, or two would be alike."""
+    """The names without an affix; None where one lacks it, or two would be alike."""
     cores = [core for name in names if (core := affix.core(name)) is not None]
     return tuple(cores) if len(set(cores)) == len(names) else None
 
@@ -147,7 +147,7 @@ def is_clear(affix: Affix, names: Sequence[str], cores: Sequence[str]) -> bool:
 
 
 def is_namespace(affix: Affix, name: str) -> bool:
-    """Whether a sign that no name has inside parts what a name begins with from the rest."""
+    """Whether one of the signs of namespaces and paths parts it from the rest of a name."""
     if not affix.before:
         return False
     found, count = parsed(name), len(affix.before)
@@ -163,7 +163,7 @@ def is_foreign(affix: Affix) -> bool:
 
 
 def _common(texts: Sequence[tuple[str, ...]], share: float, most: int) -> list[tuple[str, ...]]:
-    """What at least so many, above a half, begin with: nothing, and each time a word more."""
+    """Beginnings that at least this share, above a half, have: none, then a word more each."""
     found: list[tuple[str, ...]] = [()]
     having = list(texts)
     while having and len(found) <= most:

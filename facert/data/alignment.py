@@ -11,10 +11,10 @@ from facert.data.spelling import SIDES, is_number, joined, words
 from facert.errors import InputError
 
 SHARED = 0.8
-"""Of a list's names have an affix that counts as its own."""
+"""Share of a list's names that must have an affix for it to count as the list's own."""
 NEARLY, MOST = 0.8, 0.5
-"""Of the shorter list's names are to match: by an affix that only the other list shows, and by one
-that its own list shows."""
+"""Shares of the shorter list's names that must match: by an affix that only the other list shows,
+and by one that its own list shows."""
 _ENOUGH = 3
 _MOST_WORDS = 24
 
@@ -108,7 +108,7 @@ def _cores(names: Sequence[str], halves: bool) -> dict[str, list[tuple[Affix, in
 
 
 def _without(affix: Affix, names: Sequence[str]) -> dict[str, int]:
-    """The names that have an affix, without it and folded; those alike left out."""
+    """The names that have an affix, without it and folded; those that are alike are left out."""
     found: dict[str, int] = {}
     twice: set[str] = set()
     for index, name in enumerate(names):
@@ -147,7 +147,7 @@ class _Removed:
 
     @property
     def is_own(self) -> bool:
-        """Whether the list shows it without the other."""
+        """Whether the list shows it by itself."""
         if self.is_named:
             return True
         having = sum(self.affix.core(one) is not None for one in self.names)

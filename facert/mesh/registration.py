@@ -24,11 +24,11 @@ from facert.mesh.rigid import align
 log = logging.getLogger("facert")
 
 STILL = 0.1
-"""So many vertices of a face stay near their place in an expression, as a share, at least."""
+"""Least share of a face's vertices that stay near their place in an expression."""
 NEAR = 0.05
 """What moves less, in widths of the face, is near its place."""
 BESIDE = 0.35
-"""Farther off, in widths, is beside the neutral: shapes of the whole head move it less."""
+"""What is farther off, in widths, is beside the neutral: shapes of teeth or heads move less."""
 ALL_BESIDE = 0.02
 """As far off, if all shapes are by the same vector: it is the neutral that stands elsewhere."""
 TURNED = 60.0
