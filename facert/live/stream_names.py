@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class StreamNames:
 
     def __init__(self, wanted: Sequence[str]) -> None:
         self._wanted = tuple(wanted)
-        self._index = NameIndex(self._wanted)
+        self._look_up_in(NameIndex(self._wanted))
         self._rows: dict[tuple[str, str], int] = {}
         self._aligned: Alignment | None = None
         self._settled = self._tries = 0
@@ -89,6 +90,9 @@ class StreamNames:
             count = plural(len(absent), "name")
             log.info("%s not sent yet, not observed until then: %s", count, listed(absent))
 
+    def _look_up_in(self, index: NameIndex) -> None:
+        self._find = lru_cache(2 * MOST)(index.find)  # as all are looked up with each new one
+
     def _labels(self) -> list[str]:
         """The names; with its path, where a name comes under several."""
         count = Counter(name for _, name in self._rows)
@@ -96,7 +100,7 @@ class StreamNames:
 
     def _place(self, labels: Sequence[str]) -> bool:
         """Give each wanted name that has none the row of its label; return if all are wanted."""
-        places = [self._index.find(label) for label in labels]
+        places = [self._find(label) for label in labels]
         for row, place in enumerate(places):
             if place is None:
                 continue
@@ -126,7 +130,8 @@ class StreamNames:
             return False
         if index.aligned is None or _same(index.aligned, self._aligned):
             return False
-        self._index, self._aligned = index, index.aligned
+        self._look_up_in(index)
+        self._aligned = index.aligned
         log.info("%s", self._aligned.text(labels, self._wanted))
         return True
 

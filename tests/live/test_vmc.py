@@ -10,9 +10,10 @@ from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
+from facert.data.names import NameIndex
 from facert.live.frames import BadPacketError, Observed
 from facert.live.osc import MOST_ALIKE, MOST_LENGTHS, PacketTemplates, message, parse
-from facert.live.stream_names import MOST
+from facert.live.stream_names import MOST, StreamNames
 from facert.live.vmc import OscDecoder, OscEncoder, VmcEncoder
 
 NAMES = ("jawOpen", "mouthSmileLeft", "Brow Up")
@@ -362,3 +363,16 @@ def test_names_of_a_stream_go_to_the_log_as_text(caplog):
     feed(weights(MANY), *values(["jawOpen", "JawOpen"]), APPLY)
     assert "jawOpen and JawOpen are one name" in caplog.text
     assert "/jawOpen" not in caplog.text
+
+
+def test_in_a_flood_of_names_each_is_looked_up_once(monkeypatch):
+    sought = []
+    find = NameIndex.find
+    monkeypatch.setattr(
+        NameIndex, "find", lambda self, name: sought.append(name) or find(self, name)
+    )
+    names = StreamNames(("jawOpen",))
+    for number in range(200):
+        names.row(f"x{number}")
+        names.settle()
+    assert len([name for name in sought if name != "jawOpen"]) <= 400
