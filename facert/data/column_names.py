@@ -102,7 +102,8 @@ _STEMS = _set(
     "tongue teeth tooth smile frown pucker funnel dimple kiss grin jaw chin neck squint viseme "
     "phoneme happy sad angry anger surprise fear disgust joy sorrow neutral emotion expression "
     "open close wide stretch raise lower upper inner outer roll pitch yaw rotat press shrug left "
-    "right corner wrinkle depress tighten compress suck bite swallow throat"
+    "right corner wrinkle depress tighten compress suck bite swallow throat smirk pout laugh scowl "
+    "contempt confus worr scream shout whistle snarl grimace yawn crease bulge flare clench"
 )
 _FACE_STEMS = tuple(sorted(_STEMS))
 _FACE_WORDS = _set("head up down au aa ih ou ee oh ear ears rot vis")

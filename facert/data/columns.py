@@ -115,8 +115,10 @@ def _role_of_shape(column: FloatArray, time: FloatArray) -> Role | None:
     """A clock or a counter, if a column rises as one: beyond the range of weights, and steadily."""
     observed = np.isfinite(column)
     column, time = column[observed], time[observed]
-    if len(column) < ENOUGH or not (np.diff(column) > 0).all():
+    if len(column) < ENOUGH:
         return None
+    if not (np.diff(column) > 0).all():
+        return Role.COUNTER if _wraps(column) else None
     span = column[-1] - column[0]
     if span <= _WEIGHTS:
         return None
@@ -127,6 +129,12 @@ def _role_of_shape(column: FloatArray, time: FloatArray) -> Role | None:
         return Role.COUNTER if np.ptp(steps) == 0 or _is_line(column, time) else None
     rows = np.arange(len(column), dtype=np.float64)
     return Role.CLOCK if _is_line(column, time) or _is_line(column, rows) else None
+
+
+def _wraps(column: FloatArray) -> bool:
+    """Whether a column (T,) counts by one, over and over again: 0 to 9, or the frames of seconds."""
+    count = np.ptp(column) + 1
+    return bool(count > 3 and (np.diff(column) % count == 1).all())
 
 
 def _is_line(column: FloatArray, time: FloatArray, most: float = _LINEAR) -> bool:
@@ -160,7 +168,12 @@ def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) ->
     absent = np.zeros(len(values), dtype=np.bool_)
     for column, role in roles.items():
         here = _rows_without(values[:, column], role)
-        if _states_absence(names[column], role) and 0 < here.sum() < len(here):
+        if not _states_absence(names[column], role) or not here.any():
+            continue
+        if here.all():
+            text = "no face in any row, by %r: taken for a flag that is not kept, all rows are read"
+            log.warning(text, names[column])
+        else:
             log.info(
                 "%s without a face by %r: not observed",
                 plural(int((here & ~absent).sum()), "row"),

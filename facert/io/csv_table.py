@@ -180,7 +180,7 @@ def _body(time: FloatArray, values: FloatArray) -> str:
 def _is_short(time: FloatArray) -> bool:
     """Whether ten digits tell times (T,) apart."""
     short = np.array([float(f"{one:.10g}") for one in (time[0], time[-1])])
-    return bool(np.abs(short - time[[0, -1]]).max() <= 1e-6 and (np.diff(time) > 1e-5).all())
+    return bool(np.abs(short - time[[0, -1]]).max() <= 1e-7 and (np.diff(time) > 1e-5).all())
 
 
 def _in_digits(values: FloatArray) -> FloatArray:

@@ -70,6 +70,8 @@ CLOCKS = {
     "rows": np.arange(FRAMES),
     "rows from 1001": 1001.0 + np.arange(FRAMES),
     "every second row": 2.0 * np.arange(FRAMES),
+    "a buffer's number": np.arange(FRAMES) % 10.0,
+    "frames of a second": 1 + (7 + np.arange(FRAMES)) % 30.0,
 }
 
 
@@ -92,6 +94,9 @@ HONEST = {
     "mouth_open_percent": np.rint(np.linspace(0, 100, FRAMES)),
     "eyeBlinkLeft": (rng.uniform(size=FRAMES) > 0.9).astype(float),
     "ramp": np.linspace(0, 1, FRAMES),
+    "smirk": (rng.uniform(size=FRAMES) > 0.8).astype(float),
+    "steps": np.arange(FRAMES) % 3.0,
+    "sawtooth": np.arange(FRAMES) % 10 / 10,
     "slow": 10 * np.sin(TIME),
     "I": np.linspace(0, 1, FRAMES),
     "T": rng.uniform(size=FRAMES),
@@ -131,9 +136,10 @@ def test_a_flag_hides_the_rows_without_a_face(name, here, gone, caplog):
     assert f"10 rows without a face by {name!r}" in caplog.text
 
 
-def test_a_flag_that_denies_every_row_hides_none():
+def test_a_flag_that_denies_every_row_hides_none(caplog):
     values = np.column_stack([np.zeros(FRAMES), WEIGHTS])
     assert not weight_columns(["success", "a1", "b1", "c1"], values, TIME).absent.any()
+    assert "no face in any row, by 'success'" in caplog.text
 
 
 def test_a_tracker_s_number_of_a_face_hides_no_row():
