@@ -96,6 +96,7 @@ _JOINED = re.compile(
     f"({'|'.join(_LONG)})({'|'.join([*_LONG, 'ms', 'us', 'ns', 's', 'id', 'no'])})?"
 )
 _MOST = 40  # letters of a name of this kind
+_REMEMBERED = 2**16  # names: a table asks several times for each of its own
 
 _STEMS = _set(
     "brow eyebrow forehead eye lid gaze blink pupil wink nose nostril sneer cheek puff mouth lip "
@@ -110,7 +111,7 @@ _FACE_WORDS = _set("head up down au aa ih ou ee oh ear ears rot vis")
 _ACTION_UNIT = re.compile(r"au\d+.*", re.IGNORECASE)
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=_REMEMBERED)
 def role_of_name(name: str) -> Role | None:
     """The meaning of a column by its name alone; None for a weight, and for what may be one.
 
@@ -164,6 +165,7 @@ def _role_of_number(found: tuple[str, ...], roles: set[Role]) -> Role:
     return Role.COUNTER
 
 
+@lru_cache(maxsize=_REMEMBERED)
 def name_words(name: str) -> tuple[str, ...]:
     """The words of a column's name in lower case; ``timestampms`` is taken apart.
 
@@ -189,7 +191,7 @@ def unit_of_name(name: str) -> float | None:
     return stated[-1] if stated else None
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=_REMEMBERED)
 def names_face(name: str) -> bool:
     """Whether a name has a word of a face, so that its values are those of a weight.
 

@@ -132,7 +132,7 @@ def _role_of_shape(column: FloatArray, time: FloatArray) -> Role | None:
 
 
 def _wraps(column: FloatArray) -> bool:
-    """Whether a column (T,) counts by one, over and over again: 0 to 9, or the frames of seconds."""
+    """Whether a column (T,) counts by one, over and over: to 9, or the frames of a second."""
     count = np.ptp(column) + 1
     return bool(count > 3 and (np.diff(column) % count == 1).all())
 
