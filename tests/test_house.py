@@ -78,3 +78,9 @@ def test_few_things_lie_at_the_root() -> None:
     entries = [path for path in ROOT.iterdir() if path.name != "__pycache__"]
     assert len(entries) <= 20
     assert {path.stem for path in entries} == {*FLOORS, "__init__", "py"}
+
+
+def test_no_two_files_of_tests_have_one_name() -> None:
+    names = [path.name for path in Path(__file__).parent.rglob("test_*.py")]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    assert not twice, "pytest imports them by their names"
