@@ -224,6 +224,9 @@ def learnable(take: Take, keep: Sequence[str] = (), sparse: bool = False) -> Tak
 def require_there(keep: Sequence[str], names: Sequence[str]) -> None:
     """Refuse to keep a column that is not there."""
     for pattern in keep:
+        if not pattern.strip():
+            fix = "Give a column without a name one in the table."
+            raise InputError("--keep", "the name of a column", "an empty one", fix)
         if not fitting(pattern, names):
             found = f"no such column among {len(names)}"
             raise InputError("--keep", f"the column {pattern!r}", found, "Correct the name.")

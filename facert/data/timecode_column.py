@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.data.rate import AGREES, whole_count
+from facert.data.rate import AGREES, BROKEN, whole_count
 from facert.data.timecode import (
     LIVE_LINK_RATE,
     TICKS,
@@ -57,6 +57,11 @@ class TimecodeClock:
     """The first timecode, FF in its own count; empty where there is none."""
     first_ticks: int
     """Ticks from midnight to it."""
+
+    def counts_broken(self, fps: float) -> bool:
+        """Whether FF count the frames of a rate as 29.97, none of whose numbers are dropped."""
+        parts = "." in self.first
+        return fps in BROKEN and self.count == whole_count(fps) and not (self.drop or parts)
 
     def start(self, fps: float) -> str:
         """The first timecode so that its count shows when it is read alone.
@@ -214,7 +219,9 @@ def _count(column: _Column, fps: float | None) -> int:
     if len(possible) > 1:
         listed = ", ".join(map(str, possible[:-1])) + f" or {possible[-1]}"
         log.warning(
-            "timecodes may count %s a second: taken as %d (--in-fps decides)", listed, taken
+            "timecodes may count %s a second: taken as %d (facert convert --in-fps decides)",
+            listed,
+            taken,
         )
     return taken
 

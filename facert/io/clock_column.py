@@ -21,7 +21,7 @@ from facert.data.column_names import (
     unit_of_name,
 )
 from facert.data.columns import rises
-from facert.data.rate import nominal_rate, whole_count
+from facert.data.rate import nominal_rate, standard_rate, whole_count
 from facert.data.timecode import LIVE_LINK_RATE, TICKS, has_thousandths, parse_timecode
 from facert.data.timecode_column import read_timecodes
 from facert.errors import InputError
@@ -40,12 +40,14 @@ _UNITS = {
     1e-7: ("ticks of 100 ns", 1.2e17, 7e17),
     60.0: ("minutes", np.inf, np.inf),
 }
+_OVERRULED = "facert convert --in-fps overrules it"
 _SMALL = (1e-3, 1e-6, 1e-9, 1e-7)
 _USUAL_RATES, _RATES = (10.0, 250.0), (1.0, 250.0)
 _FASTEST = 1000.0
 _ENOUGH, _SHAPED = 5, 10  # rows that show a unit, and a clock without a name
 _REGULAR = 0.5  # of the usual step, by which most others differ at most
 _MOSTLY = 0.8  # of the steps of a clock are forward
+_WEIGHTS, _NEAR = 1.5, 0.05  # range of weights, and how near a ramp there comes to a known rate
 _LATE = 1e5  # seconds: a clock that begins later counts from elsewhere
 
 
@@ -91,7 +93,7 @@ def _clock_column(table: Table, fps: float | None, sparse: bool) -> int | None:
     for column in candidates:
         if _is_usable(table, column, fps):
             return column
-    shaped = _by_shape(table) if fps is None and not sparse else None
+    shaped = None if sparse else _by_shape(table, fps)
     if shaped is not None:
         return shaped
     amiss = (c for c in candidates if fps is None or not _is_idle(table, c))
@@ -112,8 +114,12 @@ def _rate_column(table: Table) -> float | None:
         if name_words(name) in (("fps",), ("framerate",), ("frame", "rate")):
             same = bool((values == values[0]).all())
             if same and 0 < values[0] <= _FASTEST:
-                log.info("%r states %g frames a second; --in-fps overrules it", name, values[0])
-                return float(values[0])
+                log.info(
+                    "%r states %g frames a second; facert convert --in-fps overrules it",
+                    name,
+                    values[0],
+                )
+                return standard_rate(float(values[0]))
     return None
 
 
@@ -153,19 +159,35 @@ def _mostly_rises(values: FloatArray) -> bool:
     return bool(np.isfinite(values).all() and (not len(up) or up.mean() > _MOSTLY))
 
 
-def _by_shape(table: Table) -> int | None:
-    """The first column without a weight's name that rises steadily, as time does in some unit."""
+def _by_shape(table: Table, fps: float | None) -> int | None:
+    """The first column without a weight's name that rises steadily, as time does in some unit.
+
+    Where a rate is known, a rise within the range of weights must be at that rate.
+    """
     for column, name in enumerate(table.names):
-        values = table.numbers[:, column]
-        if names_face(name) or role_of_name(name) is not None or len(values) < _SHAPED:
+        role = role_of_name(name)
+        if names_face(name) or role not in (None, Role.COUNTER) or len(table) < _SHAPED:
             continue
-        steps = np.diff(values)
-        if np.isfinite(values).all() and (steps > 0).all() and _is_regular(steps):
-            rate = 1 / (_unit_by_step(values) * float(np.median(steps)))
-            if _RATES[0] < rate <= _FASTEST:
-                log.warning("no column is called time: %r rises as one", name)
-                return column
+        if column in table.texts:
+            clock = _is_usable(table, column, fps)
+        else:
+            clock = _is_clock(table.numbers[:, column], role is Role.COUNTER, fps)
+        if clock:
+            log.warning("no column is called time: %r rises as one", name)
+            return column
     return None
+
+
+def _is_clock(values: FloatArray, numbered: bool, fps: float | None) -> bool:
+    """Whether values rise steadily at the rate of a recording; `numbered` ones may be of rows."""
+    steps = np.diff(values)
+    if not (np.isfinite(values).all() and (steps > 0).all() and _is_regular(steps)):
+        return False
+    if numbered and not ((values - values[0]) % steps.min()).any():
+        return False
+    rate = 1 / (_unit_by_step(values) * float(np.median(steps)))
+    agrees = fps is None or np.ptp(values) > _WEIGHTS or abs(rate - fps) <= _NEAR * fps
+    return _RATES[0] < rate <= _FASTEST and agrees
 
 
 def _even(table: Table, fps: float | None) -> Clock:
@@ -205,7 +227,12 @@ def _number_clock(table: Table, column: int, sparse: bool) -> Clock:
     seconds = put_together((values - origin) * unit, table.numbers)
     if not plain:
         start = f", {origin:.10g} for 0" if origin and not sparse else ""
-        log.info("%r is taken for %s%s; --in-fps overrules it", name, _UNITS[unit][0], start)
+        log.info(
+            "%r is taken for %s%s; facert convert --in-fps overrules it",
+            name,
+            _UNITS[unit][0],
+            start,
+        )
     if not sparse:
         _warn_of_rate(name, values, seconds)
     return Clock(seconds, nominal_rate(seconds), column, origin * unit)
@@ -217,7 +244,7 @@ def in_seconds(name: str, values: FloatArray) -> FloatArray:
     unit = _unit_by_step(values) if plain else 1.0
     if unit == 1.0:
         return values
-    log.info("%r is taken for %s; --in-fps overrules it", name, _UNITS[unit][0])
+    log.info("%r is taken for %s; " + _OVERRULED, name, _UNITS[unit][0])
     return np.asarray((values - values[0]) * unit)
 
 
@@ -257,10 +284,10 @@ def _warn_of_rate(name: str, values: FloatArray, seconds: FloatArray) -> None:
     rate = 1 / float(np.median(steps))
     if rate < 1 or rate > _FASTEST:
         text = "%r makes %.3g frames a second, which is unlikely: if it is in another unit, "
-        log.warning(text + "state the rate with --in-fps", name, rate)
+        log.warning(text + "state the rate with facert convert --in-fps", name, rate)
     elif len(values) >= _ENOUGH and (np.diff(values) == 1.0).all():
         text = "%r rises by 1 a row and is taken for seconds: if it counts frames, state their "
-        log.warning(text + "rate with --in-fps", name)
+        log.warning(text + "rate with facert convert --in-fps", name)
 
 
 def _text_clock(table: Table, column: int, fps: float | None, sparse: bool) -> Clock:
@@ -285,6 +312,9 @@ def _code_clock(table: Table, column: int, fps: float | None) -> Clock:
     clock = read_timecodes(codes_of_texts(table.texts[column]), fps)
     assert clock is not None  # they have FF, as was asked before
     time = put_together(clock.seconds, table.numbers)
+    if fps is not None and clock.counts_broken(fps):
+        log.info("timecodes of %d a second: counted at %.6g", clock.count, fps)
+        return Clock(time * (clock.count / fps), fps, column, start_timecode=clock.start(fps))
     rate = nominal_rate(time)
     return Clock(time, rate, column, clock.first_ticks / TICKS, clock.start(rate))
 
@@ -293,7 +323,7 @@ def _counted_clock(table: Table, column: int, fps: float | None) -> Clock:
     """The clock of timecodes of single frames, which do not show what FF count."""
     name, texts = table.names[column], table.texts[column]
     if fps is None and not any(map(has_thousandths, texts)):
-        fix = "Give --in-fps, the rate of the recording, or a column frame."
+        fix = "Give the recording's rate, facert convert --in-fps, or a column frame."
         raise InputError(f"column {name}", "how many FF make a second", "timecodes alone", fix)
     count = LIVE_LINK_RATE if fps is None or has_thousandths(texts[0]) else whole_count(fps)
     ticks = [parse_timecode(text, count) for text in texts]

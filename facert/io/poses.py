@@ -86,7 +86,9 @@ def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
         return take
     few = take.fps < _FRAMES and _has_column_of_times(path)
     if few or frames_shown(take.time) is None:
-        log.info("%s: the times of its poses stay: --in-fps counts frames", path.name)
+        log.info(
+            "%s: the times of its poses stay: facert convert --in-fps counts frames", path.name
+        )
         return take
     return counted_at(take, fps)
 

@@ -148,7 +148,9 @@ def _of_mediapipe(names: Sequence[str], columns: Sequence[int]) -> list[int]:
     shapes = sum(canonical(names[column]) in ARKIT_NAMES for column in columns)
     if not neutral or shapes < _FEWEST_SHAPES:
         return list(columns)
-    log.info("left out, as no shape: '_neutral' of MediaPipe; --keep _neutral keeps it")
+    log.info(
+        "left out, as no shape: '_neutral' of MediaPipe; facert convert --keep _neutral keeps it"
+    )
     return [column for column in columns if column not in neutral]
 
 
@@ -160,9 +162,9 @@ def _of_openface(names: Sequence[str], columns: Sequence[int]) -> list[int]:
     flags = [column for column in columns if role_of_name(names[column]) is not None]
     rest = [names[c] for c in columns if c not in {*units, *flags}]
     if rest:
-        text = "OpenFace: %s of 0 to 5 are read; left out: %s; --keep NAME keeps one, and a table "
+        text = "OpenFace: %s of 0 to 5 are read; left out: %s; facert convert --keep NAME keeps "
         log.info(
-            text + "of X_0, Y_0, Z_0 ... alone is one of markers",
+            text + "one, and a table of X_0, Y_0, Z_0 ... alone is one of markers",
             plural(len(units), "action unit"),
             listed(list(map(repr, rest))),
         )
