@@ -187,7 +187,7 @@ def _is_clock(values: FloatArray, numbered: bool, fps: float | None) -> bool:
         return False
     rate = 1 / (_unit_by_step(values) * float(np.median(steps)))
     agrees = fps is None or np.ptp(values) > _WEIGHTS or abs(rate - fps) <= _NEAR * fps
-    return _RATES[0] < rate <= _FASTEST and agrees
+    return bool(_RATES[0] < rate <= _FASTEST and agrees)
 
 
 def _even(table: Table, fps: float | None) -> Clock:
