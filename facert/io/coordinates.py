@@ -33,14 +33,16 @@ _POSITIONS, *_OTHERS = (
         ),
         (rf"(?P<name>.+?)\s*[._:\s/|-]\s*(?P<axis>[xyz]){_UNIT}", re.IGNORECASE),
         (r"(?P<name>.+?)\s*[\[(]\s*(?P<axis>[xyz])\s*[\])]", re.IGNORECASE),
-        (r"(?P<name>.*[^\W_A-Z])(?P<axis>[XYZ])", 0),
-        (r"(?P<name>[^\W_a-z]{2,})(?P<axis>[XYZ])", 0),
-        (r"(?P<name>[^\W_]{3,})(?P<axis>[xyz])", 0),
         (r"(?P<axis>[xyz])[._:\s-]?(?P<name>\d+)", re.IGNORECASE),
         (r"(?P<axis>[xyz])[._:\s-](?P<name>.+)", re.IGNORECASE),
     )
 )
-_SPELLINGS = (_OWN, _POSITIONS, _PLAIN, *_OTHERS)
+_GLUED = (
+    re.compile(r"(?P<name>.*[^\W_A-Z])(?P<axis>[XYZ])"),
+    re.compile(r"(?P<name>[^\W_a-z]{2,})(?P<axis>[XYZ])"),
+    re.compile(r"(?P<name>[^\W_]{3,})(?P<axis>[xyz])"),
+)
+_SPELLINGS = (_OWN, _POSITIONS, _PLAIN, *_OTHERS, *_GLUED)
 _ROTATIONS = {"rot", "rotation", "rotate", "angle", "euler", "quat", "quaternion", "scale"}
 
 _ENOUGH = 10  # rows that show of what kind values are
@@ -72,7 +74,7 @@ def markers_among(names: Sequence[str], values: FloatArray, sure: bool = False) 
             continue
         markers = Markers(tuple(found), np.array(list(found.values()), dtype=np.int64), unit)
         if markers.columns.size == len(names):
-            if not sure and not _are_positions(markers, values):
+            if not sure and not _are_positions(markers, values, spelling in _GLUED):
                 return None
             if spelling not in (_OWN, _PLAIN) and not sure:
                 log.info("markers by columns such as %r", names[markers.columns[0, 0]])
@@ -98,9 +100,14 @@ def _triples(spelling: re.Pattern[str], names: Sequence[str]) -> tuple[dict[str,
     return {name: [place[name, axis] for axis in "xyz"] for name in whole}, unit
 
 
-def _are_positions(markers: Markers, values: FloatArray) -> bool:
-    """Whether names and values can be those of markers; the log has it if not."""
-    if not _like_weights(markers, values):
+def _are_positions(markers: Markers, values: FloatArray, glued: bool) -> bool:
+    """Whether names and values can be those of markers; the log has it if not.
+
+    Where nothing stands between name and axis, values within the range of weights are weights.
+    """
+    small = not (np.abs(values[:, markers.columns]) > _IN_WEIGHTS).any()
+    turns = any(name.lower().endswith(tuple(_ROTATIONS)) for name in markers.names)
+    if not (glued and (small or turns)) and not _like_weights(markers, values):
         return True
     log.info(
         "columns such as %s.x are weights by name or values; "

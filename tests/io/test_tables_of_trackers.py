@@ -249,6 +249,8 @@ WEIGHTS_LIKE_MARKERS = {
     "few of many": ["gaze.x", "gaze.y", "gaze.z", *ARKIT_SHAPES[:9]],
     "clipped weights": ["a.x", "a.y", "a.z", "b.x", "b.y", "b.z"],
     "two axes": ["look_x", "look_y"],
+    "nothing between": ["mouthx", "mouthy", "mouthz"],
+    "capitals": ["PHONEX", "PHONEY", "PHONEZ"],
 }
 
 
