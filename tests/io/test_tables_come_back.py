@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.io.csv_table import read_table, write_table
-from facert.io.formats import read_take_file
+from facert.io.formats import read_take_file, write_take_file
 from facert.io.poses import read_poses
 
 FRAMES = 12
@@ -67,6 +67,20 @@ def test_weights_and_poses_come_back(folder, names, kinds, as_poses):
         assert read.names == tuple(names)
         np.testing.assert_allclose(read.values, values, rtol=1e-9)
     np.testing.assert_allclose(read_poses(path).time, TIME, rtol=1e-9)
+
+
+@settings(deadline=None, max_examples=40)
+@given(names, kinds, st.booleans())
+@example(["frame", "smile"], ["counter"] * 7, False)
+def test_curves_come_back(folder, names, kinds, as_poses):
+    values = columns_of(names, kinds)
+    path = folder / "a.json"
+    source = Source(np.ones((FRAMES, 1)), ["other"]) if as_poses else Source(values, names)
+    poses = {"controls": Controls(names), "params": values} if as_poses else {}
+    write_take_file(Take(TIME, source, **poses), path, overwrite=True)
+    for read in (read_take_file(path).source, read_poses(path)):
+        assert read.names == tuple(names)
+        np.testing.assert_array_equal(read.values, values)
 
 
 @settings(deadline=None, max_examples=60)
