@@ -102,6 +102,62 @@ def test_a_rest_at_zero_is_a_face():
         assert str(find_faults(source(values))) == "none"
 
 
+@pytest.fixture(scope="module")
+def tracked():
+    """Weights (300, 30) as a tracker gives them: a third often exactly 0, the others never."""
+    rng, time = np.random.default_rng(2), np.arange(300) / 30.0
+    waves = np.sin(2 * np.pi * time[:, None] * rng.uniform(0.2, 1.0, 30) + rng.uniform(0, 6, 30))
+    moving = np.clip(0.05 + 0.2 * waves[:, :10], 0.0, None)
+    rest = 0.02 + 0.01 * waves[:, 10:] + 0.001 * rng.random((300, 20))
+    rest[150:, 3] += 0.5 * np.sin(np.arange(150) / 24.0) ** 2
+    return np.hstack([moving, rest])
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, 0.5])
+@pytest.mark.parametrize("length", [1, 4, 15])
+def test_a_placeholder_is_found_wherever_a_tracker_writes_it(tracked, value, length):
+    for first in [*range(0, 301 - length, 23), 300 - length]:
+        values = tracked.copy()
+        values[first : first + length] = value
+        expected = np.zeros(300, dtype=bool)
+        expected[first : first + length] = True
+        np.testing.assert_array_equal(find_faults(source(values)).blank.all(axis=1), expected)
+        values[max(first - 2, 0) : first] = values[first + length : first + length + 2] = np.nan
+        np.testing.assert_array_equal(find_faults(source(values)).blank.any(axis=1), expected)
+
+
+def test_a_rest_of_many_weights_at_zero_is_a_face():
+    rng, time = np.random.default_rng(3), np.arange(300)[:, None]
+    speed, height = rng.uniform(0.02, 0.06, 24), rng.uniform(0.3, 1.0, 24)
+    waves = height * np.abs(np.sin(speed * time))  # all at 0 in the first frame alone
+    eased = height * np.sin(speed * time) ** 2
+    late = np.vstack([np.zeros((20, 24)), eased[:-20]])
+    linear = np.vstack([np.zeros((15, 24)), np.clip(height * time / 40.0, 0.0, 1.0)])
+    poses = rng.random((40, 24)) ** 2
+    poses[[0, 20]] = 0.0
+    stepped = np.repeat(poses, 10, axis=0)
+    for values in (waves, eased, late, late[::-1], linear, poses, stepped):
+        assert str(find_faults(source(values))) == "none"
+
+
+def test_frames_without_a_face_are_told_by_their_runs(as_take, weights, caplog):
+    values = weights.copy()
+    for first in (41, 61, 81, 101, 122, 141, 161):
+        values[first : first + 3] = 0.0
+    values[122] = weights[122]
+    without_faults(as_take(values))
+    runs = "(41 to 43, 61 to 63, 81 to 83, 101 to 103, 123 to 124, ...)"
+    assert f"all weights in 20 frames {runs} are 0" in caplog.text
+
+
+def test_a_frame_between_frames_without_a_face_is_not_held(as_take, weights, caplog):
+    values = weights.copy()
+    values[111:120] = values[121:130] = 0.0
+    without_faults(as_take(values))
+    assert "all weights in 18 frames (111 to 119, 121 to 129) are 0" in caplog.text
+    assert "stay the same" not in caplog.text
+
+
 def test_a_frame_that_somebody_posed_shows_a_face(weights):
     values = weights.copy()
     values[120:150] = 0.0

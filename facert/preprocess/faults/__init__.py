@@ -18,7 +18,8 @@ weights               how it is detected
 ====================  ==========================================================================
 absurd                a value many times beyond the others of the take, or the same one, out of
                       their range, again and again
-blank                 all weights alike, in frames that come and go with a jump: no face
+blank                 all weights alike, in frames that come and go with a jump, or at a number
+                      where hardly any weight is otherwise: no face
 ====================  ==========================================================================
 
 A fast motion, of the lids say, leaves the line too, but the markers around it predict it; an odd

@@ -13,6 +13,8 @@ from facert.preprocess.faults.kinds import Faults
 
 MOST = 6
 """So many markers or weights are named for each kind, those with most faults."""
+RUNS = 5
+"""Of their frames, so many runs."""
 
 
 def summary_lines(faults: Faults, source: Source) -> list[str]:
@@ -41,15 +43,20 @@ def _blank_lines(mask: BoolArray, values: FloatArray) -> Iterator[str]:
     rows = np.flatnonzero(mask.any(axis=1))
     if len(rows):
         value = np.nanmax(values[rows[0]])
-        yield f"all weights {_when(rows)} are {value:g}, coming and going with a jump (no face)"
+        why = "coming and going with a jump, or as hardly any weight is otherwise"
+        yield f"all weights {_when(rows)} are {value:g}, {why} (no face)"
 
 
 def _when(rows: IntArray) -> str:
-    """Frames in words: ``"at frame 7"``, ``"in 90 frames from 120"``."""
+    """Frames in words: ``"at frame 7"``, ``"in 97 frames (120 to 215, 300)"``."""
     if len(rows) == 1:
         return f"at frame {rows[0]}"
-    whole = rows[-1] - rows[0] + 1 == len(rows)
-    return f"in {plural(len(rows), 'frame')} from {rows[0]}" + ("" if whole else f" to {rows[-1]}")
+    count = plural(len(rows), "frame")
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    if len(runs) == 1:
+        return f"in {count} from {rows[0]}"
+    texts = [f"{run[0]}" if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs[:RUNS]]
+    return f"in {count} ({', '.join(texts)}{', ...' if runs[RUNS:] else ''})"
 
 
 def _worst(values: FloatArray) -> str:
