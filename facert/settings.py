@@ -121,7 +121,11 @@ class Settings:
         ),
     ] = None
     detect: Annotated[
-        bool, About("Take frozen, swapped and otherwise bad markers as not observed.")
+        bool,
+        About(
+            "Take bad markers (frozen, swapped, elsewhere, absurd) and weights (absurd, no face) "
+            "as not observed."
+        ),
     ] = True
     smooth: Annotated[
         bool, About("Learn from frames without gaps and noise, as far as neighbours show.")

@@ -24,6 +24,9 @@ log = logging.getLogger("facert")
 
 PAUSE = 1.5
 """A step in time longer than so many nominal frames is a pause of the recording."""
+LONGEST = 600.0
+"""Seconds of a pause, at most, that is played as it is: a longer one is of a clock that was set, or
+of two takes in one."""
 MAX_FRAMES = 2**22
 EVEN = 0.1
 """Frames lie evenly when each is off by so much of a frame at most, besides rounding."""
@@ -59,8 +62,9 @@ def evenly_spaced(take: Take) -> Take:
     Frames that lie evenly stay as they are, missing ones come between them with nothing observed;
     others are resampled, which the log has.
 
-    Raises `InputError` when there would be more than `MAX_FRAMES` frames.
+    Raises `InputError` where a pause is `LONGEST`, or there would be more than `MAX_FRAMES` frames.
     """
+    _check_pauses(take.time)
     places = frames_at(take.time, take.fps, EVEN)
     if places is None:
         even = _interpolated(take, take.fps)
@@ -157,6 +161,15 @@ def _new_times(take: Take, fps: float) -> FloatArray:
     count = np.floor((last - first) * fps + _SLACK) + 1
     _check_count(count)
     return np.asarray(np.minimum(first + np.arange(int(count)) / fps, last))
+
+
+def _check_pauses(time: FloatArray) -> None:
+    """Check that frames follow each other closely enough to be played row by row."""
+    pauses = np.diff(time)
+    if len(pauses) and pauses.max() > LONGEST:
+        found = f"{pauses.max():.6g} s without frames after frame {pauses.argmax()}"
+        fix = "Cut the recording there, or write .h5, which keeps the times."
+        raise InputError("/time", f"pauses of at most {LONGEST:g} s", found, fix)
 
 
 def _check_count(count: float) -> None:

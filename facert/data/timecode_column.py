@@ -188,7 +188,12 @@ def _is_running(fractions: Sequence[str], column: _Column) -> bool:
     steps, taken = steps[column.within], taken[column.within]
     if len(taken) >= _ROWS and (steps == taken).all():
         gap, count = min((column.gap(count), count) for count in column.counts)
-        return bool(turned.any()) or (gap <= _EXACT and count != LIVE_LINK_RATE)
+        running = bool(turned.any()) or (gap <= _EXACT and count != LIVE_LINK_RATE)
+        if not running:
+            whole = LIVE_LINK_RATE / float(np.median(taken))
+            text = "FF with its parts makes %.4g frames/s; --in-fps %.4g if the parts count frames"
+            log.info(text, whole / 1.001, whole)
+        return running
     whole = turned.any() and taken[turned].min() > np.median(taken)  # parts that came to a whole FF
     return bool((np.diff(numbers) % turn == 1).all()) and numbers[0] in (0, 1) and not whole
 

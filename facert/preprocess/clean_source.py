@@ -33,7 +33,8 @@ class SourceOptions:
     Parameters
     ----------
     detect : bool
-        Take frozen, swapped and otherwise bad markers as not observed.
+        Take bad values as not observed: markers that are frozen, swapped, at zero, elsewhere or
+        absurd, single spikes, absurd weights, and frames of weights without a face.
     smooth : bool
         Take noise out, and fill gaps, by the motion over neighbouring frames.
     sigma : float, optional

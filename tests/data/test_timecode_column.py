@@ -194,3 +194,10 @@ def test_codes_without_ff_are_none() -> None:
     assert (
         read_timecodes([part for part in map(parts_of, ["10:00:00", "10:00:01"]) if part]) is None
     )
+
+
+def test_parts_that_may_be_numbers_of_rows_are_logged(caplog) -> None:
+    caplog.set_level("INFO")
+    rows = [f"{hms(row // 60)}:{row % 60:02d}.{row:03d}" for row in range(300)]
+    np.testing.assert_allclose(clock_of(rows).seconds, np.arange(300) / 60 * 1.001)
+    assert "59.94 frames/s; --in-fps 60 if the parts count frames" in caplog.text

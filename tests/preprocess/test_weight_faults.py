@@ -195,6 +195,12 @@ def test_training_and_mapping_pass_over_absurd_weights(as_take, weights, frame):
         np.testing.assert_allclose(model.retarget(take).params, expected, atol=0.02)
 
 
+def test_a_weight_alone_that_comes_and_goes_at_once_stays():
+    values = np.zeros((30, 12))
+    values[15:, 0] = 0.8
+    assert not find_faults(Source(values, [f"w{i}" for i in range(12)])).any.any()
+
+
 def test_detection_can_be_left_out(as_take, weights):
     values = weights.copy()
     values[137, 5] = 1e9

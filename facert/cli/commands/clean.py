@@ -51,9 +51,10 @@ def command(
 ) -> None:
     """Fill gaps in markers or weights, and remove noise.
 
-    Frozen, swapped and otherwise bad markers are taken as not observed. OUT.h5 has a standard
-    deviation for every value as /source/std, and /source/filled marks what had not been observed.
-    What was never observed stays open.
+    Markers that are frozen, swapped, at zero, elsewhere or absurd, single spikes, absurd weights,
+    and frames of weights without a face are taken as not observed. OUT.h5 has a standard deviation
+    for every value as /source/std, and /source/filled marks what had not been observed. What was
+    never observed stays open.
 
     facert clean facert-demo/performance.h5 clean.h5
     facert clean facert-demo/training.h5 --out-dir cleaned --ending .csv

@@ -43,9 +43,10 @@ def command(
 ) -> None:
     """Remove the head's rigid motion from markers.
 
-    Frozen, swapped and otherwise bad markers are taken as not observed. Frames that show fewer
-    than three stable markers get the motion of their neighbours in time. OUT.h5 keeps the motion
-    as /source/head (T, 4, 4): it takes the stabilised markers to the recorded ones.
+    Markers that are frozen, swapped, at zero, elsewhere or absurd, and single spikes, are taken as
+    not observed. Frames that show fewer than three stable markers get the motion of their
+    neighbours in time. OUT.h5 keeps the motion as /source/head (T, 4, 4): it takes the stabilised
+    markers to the recorded ones.
 
     facert stabilise facert-demo/performance.h5 stable.h5
     facert stabilise facert-demo/performance.h5 as-first.h5 --reference 0

@@ -99,6 +99,8 @@ def blank_frames(weights: FloatArray, posed: Sequence[int] | IntArray = ()) -> B
     if alike.mean() > MOST:
         return np.asarray(found)
     steps = _Steps.of(weights, alike)
+    if not steps.usual:  # nothing moves, of which a jump would differ
+        return np.asarray(found)
     for first, last in _stretches(np.where(alike, low, np.nan)):
         there = slice(first, last + 1)
         if not np.isin(posed, np.arange(len(weights))[there]).any():
