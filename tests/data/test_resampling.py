@@ -234,6 +234,6 @@ def test_a_rate_that_is_given_counts_exactly(stated: float, meant: float) -> Non
 
 def test_a_pause_of_hours_is_not_played() -> None:
     time = np.append(np.arange(30), 30 + 3600 * 30 + np.arange(30)) / 30
-    with pytest.raises(InputError, match="3600.03 s without frames after frame 29"):
+    with pytest.raises(InputError, match="s without frames after frame 29"):
         evenly_spaced(make(time, 30.0))
     assert len(evenly_spaced(make(np.append(time[:30], time[30:] - 3540), 30.0))) == 60 * 31
