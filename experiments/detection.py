@@ -9,7 +9,7 @@ frames, exchanges of a marker with one of its four nearest for 1 to 100 frames, 
 with the face. A held value is counted only where it is off by more than 5 % of that deviation, and
 a stray where it is off by more than 2 cm: less does little harm, whether it is found or not. In the
 recordings of weights, these are absurd numbers for 1 and 10 frames, and all weights alike for 1 and
-30. `--quick` takes the first 600 frames of three of them, and writes no results.
+30. `--quick` takes the first 600 frames of two of them, and writes no results.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ VISIBLE = 2.0  # cm
 ABSURD = tuple(product((-50.0, 9999.0, 1e9), (1, 10)))
 BLANK = tuple(product((0.0, -1.0), (1, 30)))
 NOISES = (0.0, 0.05, 0.1)
-QUICK, QUICK_TAKES = 600, ("rom", "cheeks", "rom.csv")  # frames
+QUICK, QUICK_TAKES = 600, ("cheeks", "rom.csv")  # frames
 
 
 @dataclass(frozen=True)

@@ -189,10 +189,10 @@ def _is_running(fractions: Sequence[str], column: _Column) -> bool:
     if len(taken) >= _ROWS and (steps == taken).all():
         gap, count = min((column.gap(count), count) for count in column.counts)
         running = bool(turned.any()) or (gap <= _EXACT and count != LIVE_LINK_RATE)
-        if not running:
-            whole = LIVE_LINK_RATE / float(np.median(taken))
+        if not running and taken.all():
+            rate = LIVE_LINK_RATE / float(np.median(taken))
             text = "FF with its parts makes %.4g frames/s; --in-fps %.4g if the parts count frames"
-            log.info(text, whole / 1.001, whole)
+            log.info(text, rate / 1.001, rate)
         return running
     whole = turned.any() and taken[turned].min() > np.median(taken)  # parts that came to a whole FF
     return bool((np.diff(numbers) % turn == 1).all()) and numbers[0] in (0, 1) and not whole
