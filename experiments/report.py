@@ -39,6 +39,7 @@ def write_text(path: Path, parts: Sequence[str]) -> None:
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
     """One row a line, the names of the columns first."""
+    path.unlink(missing_ok=True)  # it bears no mark of facert, which would keep it
     with replacing(path, overwrite=True) as temporary, temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
