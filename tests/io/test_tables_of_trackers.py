@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from facert.data.labelling import labelled
 from facert.data.names import ARKIT_SHAPES
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.io.formats import read_take_file, write_take_file
 from facert.io.poses import read_poses
@@ -523,3 +525,11 @@ def test_timecodes_may_be_of_semicolons_alone(path):
     take = read_take_file(path)
     assert take.source.names == tuple(NAMES)
     np.testing.assert_allclose(take.time, np.arange(FRAMES) / 25, atol=1e-6)
+
+
+def test_poses_by_timecode_fit_a_take_of_live_link(path, tmp_path):
+    take = Take(np.arange(120) / 60, Source(rng.uniform(size=(120, 52)), ARKIT_SHAPES), fps=60)
+    recorded = tmp_path / "face.livelink.csv"
+    write_take_file(replace(take, start_timecode="10:00:00:00.000"), recorded)
+    write(path, {"timecode": ["10:00:00:30.000", "10:00:01:15.000"], "jaw": [0, 1]})
+    assert labelled(read_take_file(recorded), read_poses(path)).labels.tolist() == [30, 75]
