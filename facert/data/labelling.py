@@ -29,7 +29,7 @@ class Poses:
     time: FloatArray | None = None
     """Seconds in the take's time, (n,); or"""
     frames: IntArray | None = None
-    """the numbers of the frames, from 0, (n,)."""
+    """the numbers of the frames, from 0, (n,), which count where both are there."""
     of_clock: bool = False
     """Whether the time is that of the recorder's clock, and not from the take's beginning."""
     limits: FloatArray | None = None  # (P, 2)
@@ -48,7 +48,7 @@ def labelled(take: Take, poses: Poses) -> Take:
     """
     with reading(poses.where):
         poses = _known(poses)
-        frames = _by_number(take, poses) if poses.time is None else _by_time(take, poses)
+        frames = _by_time(take, poses) if poses.frames is None else _by_number(take, poses)
         _require_different(frames)
         controls, order = _common_controls(take, poses)
         params = np.full((len(take), len(order)), np.nan)
@@ -79,7 +79,23 @@ def _by_number(take: Take, poses: Poses) -> IntArray:
     if len(outside):
         last = len(take) - 1
         raise InputError("column frame", f"0 to {last}", f"{outside[0]}", "Count from 0.")
+    if poses.time is not None:
+        _compare(take, poses, poses.frames)
     return poses.frames
+
+
+def _compare(take: Take, poses: Poses, frames: IntArray) -> None:
+    """Warn where the times of the poses lie in the take, and name other frames."""
+    assert poses.time is not None
+    places, late = _nearest(take, _in_take(take, poses))
+    off = np.abs(places - frames)
+    if (late <= 0).all() and off.max() > 1:
+        row = int(off.argmax())
+        log.warning(
+            "%s: %s by number and by time at different frames, such as %d and %d: the numbers are "
+            "taken; to go by time, leave that column out",
+            *(poses.where, plural(int((off > 1).sum()), "pose"), frames[row], places[row]),
+        )
 
 
 def _by_time(take: Take, poses: Poses) -> IntArray:
@@ -92,6 +108,9 @@ def _by_time(take: Take, poses: Poses) -> IntArray:
         row, zero = astray[0], poses.time[astray[0]] - time[astray[0]]
         expected, near = "within half a frame of one of the take", take.time[frames[row]] + zero
         fix = "Count seconds as the take does, or give a column frame."
+        in_ms = replace(poses, time=poses.time / 1e3, of_clock=False)
+        if (_nearest(take, _in_take(take, in_ms))[1] <= 0).all():
+            fix = "If they are milliseconds, call the column time_ms."
         found = f"{poses.time[row]:.3f} s"
         raise InputError("time of the poses", f"{expected}, such as {near:.3f} s", found, fix)
     return frames

@@ -58,6 +58,11 @@ class TimecodeClock:
     first_ticks: int
     """Ticks from midnight to it."""
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether the times are known without a rate: the app's sixtieths and their thousandths."""
+        return "." in self.first and self.count == LIVE_LINK_RATE
+
     def counts_broken(self, fps: float) -> bool:
         """Whether FF count the frames of a rate as 29.97, none of whose numbers are dropped."""
         parts = "." in self.first
@@ -107,13 +112,26 @@ class _Column:
 
         Parts of FF are the app's, so that it takes more to show something else.
         """
-        across = np.diff(self.numbers(count))[np.diff(self.whole) == 1]
-        in_parts = bool(np.mod(self.frames, 1).any())
-        least_within, least_across = (_STEPS, _SECONDS) if in_parts else (1, 1)
-        if self.within.sum() < least_within or len(across) < least_across:
+        least_within, least_across = (_STEPS, _SECONDS) if self.in_parts else (1, 1)
+        if self.within.sum() < least_within or self.across.sum() < least_across:
             return np.inf
         usual = self.usual(count)
+        across = np.diff(self.numbers(count))[self.across]
         return abs(float(np.median(across)) - usual) / usual
+
+    def allows(self, count: int) -> bool:
+        """Whether a stated rate may mean that so many make a second: parts of FF are the app's."""
+        return not self.in_parts or count == LIVE_LINK_RATE or LIVE_LINK_RATE not in self.counts
+
+    @property
+    def in_parts(self) -> bool:
+        """Whether rows lie between FF."""
+        return bool(np.mod(self.frames, 1).any())
+
+    @property
+    def across(self) -> BoolArray:
+        """Which steps go to the next second, (T - 1,)."""
+        return np.asarray(np.diff(self.whole) == 1)
 
     @property
     def within(self) -> BoolArray:
@@ -215,7 +233,7 @@ def _count(column: _Column, fps: float | None) -> int:
     possible = [count for count in counts if gaps[count] <= _GOES_ON] or list(counts)
     if column.usual(possible[0]) <= 1:
         possible = [n for n in possible if column.drops(n)] or possible
-    agreeing = [n for n in possible if fps and _agrees(n, column, fps)]
+    agreeing = [n for n in possible if fps and _agrees(n, column, fps) and column.allows(n)]
     if agreeing:
         return best if best in agreeing else agreeing[0]
     if column.thousandths and LIVE_LINK_RATE in possible:

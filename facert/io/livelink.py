@@ -22,7 +22,7 @@ import numpy as np
 from facert.data.arrays import BoolArray, FloatArray
 from facert.data.clock import rising
 from facert.data.names import ARKIT_NAMES, NameIndex, canonical, nearest
-from facert.data.rate import frames_at, nominal_rate, whole_count
+from facert.data.rate import AGREES, frames_at, frames_shown, nominal_rate, rate_shown, whole_count
 from facert.data.resampling import EVEN
 from facert.data.take import Source, Take, named_curves
 from facert.data.text import plural
@@ -84,6 +84,8 @@ def read_livelink(path: Path, fps: float | None = None) -> Take:
         values = to_numbers(rows, header, range(2, len(header)))
         kept, time = rising(clock.seconds, values)
         rate = nominal_rate(time)
+        if fps is not None and clock.is_exact:
+            _require_agrees(fps, time)
         return Take(
             time=time,
             source=Source(values[kept], _canonical_columns(header[2:])),
@@ -176,6 +178,16 @@ def _clock(rows: Sequence[Line], fps: float | None) -> TimecodeClock:
         row = rows[0] if None not in codes else rows[codes.index(None)]
         raise row.error(_LEADING[0], "HH:MM:SS:FF.mmm", repr(row.cells[0][:40]))
     return clock
+
+
+def _require_agrees(fps: float, time: FloatArray) -> None:
+    """Refuse a rate that contradicts known times (T,), unless it can count their frames anew."""
+    shown, frames = rate_shown(time), frames_shown(time)
+    even = frames is None or frames[-1] + 1 == len(time)  # who counts anew refuses uneven ones
+    if not even and abs(shown - fps) > AGREES * fps:
+        expected = f"about {shown:.4g}, as timecodes with rows missing among them show"
+        fix = "Leave it out; --fps N resamples by time."
+        raise InputError("--in-fps", expected, f"{fps:.6g}", fix)
 
 
 def _canonical_columns(header: Sequence[str]) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from facert.data.arrays import FloatArray
 from facert.data.column_names import Role, role_of_name
 from facert.data.columns import require_there
 from facert.data.labelling import Poses, poses_of, predicted_poses
@@ -18,12 +19,13 @@ from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
+from facert.io.clock_column import clock_of
 from facert.io.csv_table import is_marked
 from facert.io.formats import read_any, require_take
 from facert.io.lines import read_csv, read_header
 from facert.io.livelink import is_livelink
 from facert.io.table import Table, table_of_lines
-from facert.io.table_take import controls_of
+from facert.io.table_take import controls_of, unlogged
 from facert.io.tracker_json import read_json_table
 
 log = logging.getLogger("facert")
@@ -48,7 +50,7 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
     with reading(path):
         table = _numbered_table(path)
         if table is not None:
-            poses = _of_numbers(table, keep)
+            poses = _of_numbers(table, keep, fps)
         else:
             take = read_any(path, kind="take", or_fps=fps, keep=keep, sparse=True)
             take = _at_rate(take, path, fps)
@@ -117,7 +119,7 @@ def _frame_column(header: Sequence[str]) -> int | None:
     return lower.index(_FRAME) if _FRAME in lower else next(numbering, None)
 
 
-def _of_numbers(table: Table, keep: Sequence[str]) -> Poses:
+def _of_numbers(table: Table, keep: Sequence[str], fps: float | None) -> Poses:
     """Poses of a table that numbers their frames."""
     require_there(keep, table.names)
     place = _frame_column(table.names)
@@ -131,4 +133,20 @@ def _of_numbers(table: Table, keep: Sequence[str]) -> Poses:
     if table.names[place].strip().lower() != _FRAME:
         log.info("%r is taken for the number of the frame in the take, from 0", table.names[place])
     names, values = controls_of(table, place, keep)
-    return Poses(names=names, values=values, frames=numbers.astype(np.int64))
+    poses = Poses(names=names, values=values, frames=numbers.astype(np.int64))
+    time = _times_beside(table, place, fps)
+    return replace(poses, time=time, of_clock=time is not None)
+
+
+def _times_beside(table: Table, place: int, fps: float | None) -> FloatArray | None:
+    """The times of poses (n,) by another column than that of their frames; None without one."""
+    others = np.array([column for column in range(len(table.names)) if column != place])
+    texts = {c: table.texts[old] for c, old in enumerate(others.tolist()) if old in table.texts}
+    names = tuple(table.names[column] for column in others)
+    try:
+        with unlogged():
+            clock = clock_of(Table(names, table.numbers[:, others], texts, table.place), fps, True)
+    except InputError:
+        return None
+    counted = clock.column is None or role_of_name(names[clock.column]) is not Role.CLOCK
+    return None if counted else clock.time + clock.origin

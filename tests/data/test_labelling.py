@@ -99,3 +99,26 @@ def test_tracked_weights_pose_a_rig_that_has_their_shapes() -> None:
         weights_as_poses(Take([0, 1], Source(values, ("a", "b", "c"))), rig)
     with pytest.raises(InputError, match="gaps in every frame"):
         weights_as_poses(Take([0], Source(values[1:], (*NAMES, "headYaw"))), rig)
+
+
+def test_times_in_milliseconds_are_thought_of_in_the_message() -> None:
+    poses = Poses(NAMES, VALUES, time=np.array([0.0, 100.0, 200.0]))
+    with pytest.raises(InputError, match="milliseconds, call the column time_ms"):
+        labelled(TAKE, poses)
+    with pytest.raises(InputError, match="Count seconds as the take does"):
+        labelled(TAKE, replace(poses, time=np.array([0.0, 100.0, 9000.0])))
+
+
+def test_numbers_and_times_that_name_other_frames_are_warned_of(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    kept = np.delete(np.arange(20), [4, 5, 6])
+    take = Take(kept / 30, Source(np.ones((17, 1)), ("w",)), fps=30.0, clock_start=100.0)
+    poses = replace(numbered(2, 8, 12), time=100 + np.array([2, 8, 12]) / 30, of_clock=True)
+    found = labelled(take, poses)
+    assert found.labels.tolist() == [2, 8, 12]
+    assert "2 poses by number and by time at different frames, such as 8 and 5" in caplog.text
+    caplog.clear()
+    labelled(take, replace(poses, time=100 + kept[[2, 8, 12]] / 30))
+    labelled(take, replace(poses, time=np.array([7.0, 8.0, 12.0])))  # another clock's
+    assert not caplog.text

@@ -278,3 +278,20 @@ def test_a_clock_that_is_set_back_goes_on(path, caplog, seconds):
     take = read_livelink(path)
     np.testing.assert_allclose(take.time, np.arange(180) / 30, atol=1e-9)
     assert f"the clock steps back by {seconds} s at row 91" in caplog.text
+
+
+@pytest.mark.parametrize("rows", [16, 29, 50])
+def test_a_wrong_rate_counts_the_rows_of_a_short_even_clip_anew_and_tears_no_clock(path, rows):
+    codes = [format_timecode(2000 * (503 + i) + 595 - i // 4) for i in range(rows)]
+    write(path, ("jawOpen",), codes, [["1", f"{i / 60}"] for i in range(rows)])
+    take = read_take_file(path, fps=60.0)
+    np.testing.assert_allclose(take.time, np.arange(rows) / 60, atol=1e-3)
+
+
+def test_a_rate_that_contradicts_known_times_with_rows_missing_is_refused(path):
+    frames = np.delete(np.arange(100), [30, 31, 60]).tolist()
+    codes = [format_timecode(2000 * (503 + i) + 595 - i // 4) for i in frames]
+    write(path, ("jawOpen",), codes, [["1", f"{i / 100}"] for i in frames])
+    with pytest.raises(InputError, match="about 30, as timecodes with rows missing"):
+        read_take_file(path, fps=60.0)
+    assert read_take_file(path, fps=30.0).fps == 30.0

@@ -104,3 +104,20 @@ def test_times_of_json_are_no_frames_to_be_counted(tmp_path: Path) -> None:
     path = tmp_path / "poses.json"
     path.write_text(json.dumps([{"time": t, "jaw": t / 9} for t in (1.0, 2.0, 3.0, 4.0)]))
     np.testing.assert_array_equal(read_poses(path, 24).time, [1, 2, 3, 4])
+
+
+@pytest.mark.parametrize(
+    ("header", "cell"), [("Timecode", "01:00:00:{:02d}.000"), ("timestamp_ms", "36000{:02d}")]
+)
+def test_numbers_of_frames_keep_the_times_beside_them(
+    tmp_path: Path, header: str, cell: str
+) -> None:
+    path = tmp_path / "poses.csv"
+    rows = [f"{cell.format(frame)},{frame},0.5\n" for frame in (4, 10)]
+    path.write_text(f"{header},frame,jaw\n{''.join(rows)}")
+    poses = read_poses(path)
+    assert poses.names == ("jaw",)
+    assert poses.frames is not None and poses.frames.tolist() == [4, 10]
+    assert poses.time is not None and poses.time[0] == pytest.approx(3600, abs=0.1)
+    path.write_text("index,frame,jaw\n1,4,0.1\n2,9,0.2\n")
+    assert read_poses(path).time is None
