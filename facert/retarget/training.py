@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from facert.data.arrays import FloatArray
 from facert.data.columns import warn_of_clocks
 from facert.data.labelling import predicted_poses
 from facert.data.normalisation import Normalisation
@@ -16,7 +17,8 @@ from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
 from facert.models.optim.monitor import Monitor
-from facert.preprocess.faults.quantiles import median
+from facert.preprocess.faults.absurd import NATURAL
+from facert.preprocess.faults.quantiles import quantile
 from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.preparation import TrainingData, training_data
 from facert.regions.learning import Learned, StartingModel, learn
@@ -25,9 +27,10 @@ from facert.settings import Settings
 
 log = logging.getLogger("facert")
 
-ABSURD, LARGE, NAMED = 20.0, 0.75, 5
-"""A value of a label is absurd that is so many times as large as this quantile of a control; so
-many are named."""
+ABSURD, LARGE, OFTEN, NAMED = 3.0, 0.75, 3, 5
+"""A value of a label is absurd that is so many times as far as its control goes, by its limits, by
+this quantile of all values, and by the controls that have so many values; so many are named."""
+SHARE, PERCENT = NATURAL
 
 
 def train(
@@ -110,15 +113,14 @@ def check_poses(take: Take) -> None:
 
 
 def _warn_of_absurd_poses(take: Take) -> None:
-    """Warn of values among the labels that are many times larger than all that is like them."""
+    """Warn of values among the labels that are far beyond all that is like them."""
     if take.params is None or take.controls is None or not len(take.labels):
         return
     sizes = np.abs(take.params[take.labels])
-    large = np.quantile(sizes, LARGE, axis=0)
-    usual = float(np.median(large[large > 0.0])) if large.any() else 0.0
-    own = np.nan_to_num(median(np.where(sizes > 0.0, sizes, np.nan).T))
-    own = np.where((sizes > 0.0).sum(axis=0) > 1, own, 0.0)  # one alone is like none
-    for row, control in np.argwhere(sizes > ABSURD * np.maximum(usual, own))[:NAMED].tolist():
+    reach = ABSURD * _reach(sizes, take.controls.limits)
+    if take.animation is not None and len(take.animation):
+        reach = np.maximum(reach, np.abs(take.animation).max(axis=0))
+    for row, control in np.argwhere(sizes > reach)[:NAMED].tolist():
         log.warning(
             "the pose of frame %d has %s at %.3g, many times as much as other poses and controls:"
             " correct it if it is a slip",
@@ -126,6 +128,27 @@ def _warn_of_absurd_poses(take: Take) -> None:
             take.controls.names[control],
             take.params[take.labels[row], control],
         )
+
+
+def _reach(sizes: FloatArray, limits: FloatArray | None) -> FloatArray:
+    """How far controls go, by the sizes of their values in poses (l, P), or by their limits, (P,).
+
+    Shares go to 1; percent and degrees, of which half of a control's values are beyond 1, to about
+    100; and all as far as half of the values of another control that is often used.
+    """
+    used = np.where(sizes > 0.0, sizes, np.nan)
+    counts = (sizes > 0.0).sum(axis=0)
+    ordered = np.nan_to_num(np.sort(used, axis=0))  # NaN comes last
+    middle = ordered[np.maximum(counts - 1, 0) // 2, np.arange(sizes.shape[1])]
+    own = np.where(counts > 1, middle, 0.0)  # one alone is like none
+    large = float(quantile(used.ravel(), LARGE)) if counts.any() else 0.0
+    others = own[counts >= OFTEN].max(initial=0.0)
+    own = np.maximum(own, large)
+    reach = np.maximum(np.where(own > SHARE, np.maximum(own, PERCENT), SHARE), others)
+    if limits is None:
+        return np.asarray(reach)
+    widest = np.abs(limits).max(axis=1)
+    return np.asarray(np.where(np.isfinite(widest) & (widest > 0.0), widest, reach))
 
 
 def _start(start: Retargeter, data: TrainingData) -> StartingModel:

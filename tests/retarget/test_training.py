@@ -1,4 +1,4 @@
-"""Labels that nobody posed are refused."""
+"""Labels that nobody posed are refused; slips among labels are named."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.data.take import Source
+from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.retarget.training import check_poses, train
 from facert.settings import Settings
@@ -62,3 +62,65 @@ def test_an_absurd_value_of_a_label_is_named_with_frame_and_control(make_take, v
     train(replace(take, params=params), Settings(method="nearest"))
     name = take.controls.names[1]
     assert f"the pose of frame {frame} has {name} at {value:.3g}" in caplog.text
+
+
+def posed(poses, limits=None):
+    controls = Controls([f"c{i}" for i in range(poses.shape[1])], limits)
+    weights = np.random.default_rng(0).random((len(poses), 3))
+    return Take(np.arange(len(poses)) / 30.0, Source(weights, "abc"), controls, poses)
+
+
+@pytest.fixture(scope="module")
+def shares():
+    """Poses (16, 30) of 0 to 1; most controls rest in most of them, and some are used once."""
+    rng = np.random.default_rng(1)
+    poses = rng.random((16, 30)) * (rng.random((16, 30)) < rng.uniform(0.0, 0.4, 30))
+    poses[:, :3] = 0.03 * rng.random((16, 3))
+    poses[4, 10:], poses[5, 20] = 0.0, 1.0
+    return poses
+
+
+def warned(take, caplog) -> list[str]:
+    caplog.clear()
+    train(take, Settings(method="nearest"))
+    texts = [record.getMessage() for record in caplog.records]
+    return [text for text in texts if "many times" in text]
+
+
+def test_honest_poses_of_shares_percent_and_degrees_are_not_absurd(shares, caplog):
+    overshoot, degrees, one = shares.copy(), shares.copy(), shares.copy()
+    overshoot[3, 5] = 1.8
+    degrees[:, 7] = np.linspace(-30.0, 40.0, 16)
+    degrees[:, 8] = np.append(np.linspace(0.5, 4.0, 15), 45.0)  # mostly straight on
+    degrees[3, 9] = 25.0  # used once, but as far as another
+    one[:, :] = 0.0
+    one[np.arange(16), np.arange(16)] = 1.0
+    limits = np.tile([0.0, 100.0], (30, 1))
+    for take in (
+        *(posed(poses) for poses in (shares, overshoot, degrees, one, 100.0 * shares)),
+        posed(np.where(shares > 0.9, 90.0, shares), limits),
+    ):
+        assert not warned(take, caplog)
+
+
+@pytest.mark.parametrize("value", [8.0, 50.0, -5.0, 800.0, 1e9, -1e30])
+@pytest.mark.parametrize("limits", [None, (0.0, 1.0), (0.0, np.inf)])
+def test_a_slip_among_poses_of_shares_is_named(shares, value, limits, caplog):
+    limits = None if limits is None else np.tile(limits, (30, 1))
+    for control in (0, 8, 12, 20):
+        poses = shares.copy()
+        poses[5, control] = value
+        found = warned(posed(poses, limits), caplog)
+        assert len(found) == 1
+        assert f"frame 5 has c{control} at {value:.3g}" in found[0]
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["rom", "short", "utterance_a", "utterance_b"])
+@pytest.mark.parametrize("target", ["arkit", "units"])
+def test_poses_of_real_recordings_are_not_absurd(real_data, name, target, caplog):
+    values = np.load(real_data / "tracks" / f"{name}.npz")[target]
+    for count in (10, 20, 40):
+        for seed in range(3):
+            rows = np.random.default_rng(seed).permutation(len(values))[:count]
+            assert not warned(posed(values[rows]), caplog)
