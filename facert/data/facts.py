@@ -26,7 +26,8 @@ def facts_of(found: Take | Rig | MeshSequence) -> dict[str, Any]:
     and depth of the neutral in its units; ``time_gaps`` counts the steps in time longer than one
     and a half nominal frames, of which ``longest_gap`` has the seconds; frames that are
     ``evenly_spaced`` lie on the grid of their rate, whatever the gaps; ``zeros`` counts marker
-    positions that are exactly (0, 0, 0), which is how some programs write a lost marker.
+    positions that are exactly (0, 0, 0), which is how some programs write a lost marker, and
+    ``zero_rows`` frames whose weights are all exactly 0: no face to others, or one at rest.
     """
     if isinstance(found, MeshSequence):
         return _of_sequence(found)
@@ -88,14 +89,16 @@ def _of_source(source: Source) -> dict[str, Any]:
     active = _active(source.values)
     missing = 1.0 - source.valid.mean(axis=0)
     worst = [index for index in np.argsort(-missing, kind="stable")[:MANY] if missing[index] > 0]
-    zeros = int((source.values == 0).all(axis=2).sum()) if source.kind == "markers" else 0
+    markers = source.kind == "markers"
+    zeros = int((source.values == 0).all(axis=-1).sum())
     return {
         "kind": source.kind,
         "names": source.names,
         "active": int(active.sum()),
         "constant": _pick(source.names, ~active),
         "missing": float(missing.mean()),
-        "zeros": zeros or None,
+        "zeros": zeros or None if markers else None,
+        "zero_rows": None if markers else zeros or None,
         "worst": tuple({"name": source.names[i], "missing": float(missing[i])} for i in worst),
     }
 

@@ -82,3 +82,14 @@ def test_markers_at_the_origin_are_counted():
     values[6, 2, 0] = 0.0
     marked = replace(take, source=Source(values, take.source.names))
     assert facts_of(marked)["source"]["zeros"] == 3
+
+
+def test_frames_of_weights_that_are_all_zero_are_counted():
+    weights = np.random.default_rng(0).random((10, 4))
+    weights[:, 1] = 0.0
+    take = Take(np.arange(10) / 30.0, Source(weights, "abcd"))
+    assert facts_of(take)["source"]["zero_rows"] is None
+    weights[2:5] = 0.0
+    weights[7] = [0.0, 0.0, 0.0, np.nan]
+    found = facts_of(replace(take, source=Source(weights, "abcd")))["source"]
+    assert (found["zero_rows"], found["zeros"]) == (3, None)
