@@ -24,7 +24,7 @@ log = logging.getLogger("facert")
 
 PAUSE = 1.5
 """A step in time longer than so many nominal frames is a pause of the recording."""
-LONGEST = 600.0
+LONGEST = 3600.0
 """Seconds of a pause, at most, that is played as it is: a longer one is of a clock that was set, or
 of two takes in one."""
 MAX_FRAMES = 2**22
