@@ -8,6 +8,7 @@ whether the clock goes on from the row that steps back, or jumps to where it wou
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 import numpy as np
 
@@ -30,13 +31,19 @@ _SAME = 1e-6  # seconds
 _LOGGED = 5
 
 
-def rising(seconds: FloatArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+def _row(index: int) -> str:
+    return f"row {index + 1}"
+
+
+def rising(
+    seconds: FloatArray, values: FloatArray, place: Callable[[int], str] = _row
+) -> tuple[IntArray, FloatArray]:
     """Rows of a recording to keep, (n,), and their seconds, which rise.
 
     A clock (T,) that was set back is `put_together`; rows that then come after a later one, or
     twice, are dropped, which the log has. Seconds that are not finite are kept as they are.
     """
-    together = put_together(seconds, values)
+    together = put_together(seconds, values, place)
     rows = np.arange(len(seconds))
     if not np.isfinite(seconds).all():
         return rows, seconds
@@ -47,12 +54,14 @@ def rising(seconds: FloatArray, values: FloatArray) -> tuple[IntArray, FloatArra
     return kept, together[kept]
 
 
-def put_together(seconds: FloatArray, values: FloatArray) -> FloatArray:
+def put_together(
+    seconds: FloatArray, values: FloatArray, place: Callable[[int], str] = _row
+) -> FloatArray:
     """The seconds of all rows (T,): a clock that was set back goes on by its usual step.
 
     `values` (T, ...) show which rows are there twice. Rows that are late or twice stay where they
     are, and seconds that are not finite, or rise, as they are. The log has where the clock was set
-    back, and how far.
+    back, by each row's `place` in its file, and how far.
     """
     steps = np.diff(seconds)
     backs = np.flatnonzero(steps < 0) + 1
@@ -68,9 +77,9 @@ def put_together(seconds: FloatArray, values: FloatArray) -> FloatArray:
             continue
         size = _size(float(together[:row].max()) + usual - together[row])
         together[row:] += size
-        sizes.append((size, row + 1))
-    for size, number in sizes[:_LOGGED]:
-        log.warning("the clock steps back by %.4g s at row %d: put together", size, number)
+        sizes.append((size, place(row)))
+    for size, where in sizes[:_LOGGED]:
+        log.warning("the clock steps back by %.4g s at %s: put together", size, where)
     if len(sizes) > _LOGGED:
         log.warning("the clock steps back %d times more: put together", len(sizes) - _LOGGED)
     return together

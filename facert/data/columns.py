@@ -173,12 +173,9 @@ def _absent(names: Sequence[str], values: FloatArray, roles: dict[int, Role]) ->
         if here.all():
             text = "no face in any row, by %r: taken for a flag that is not kept, all rows are read"
             log.warning(text, names[column])
-        else:
-            log.info(
-                "%s without a face by %r: not observed",
-                plural(int((here & ~absent).sum()), "row"),
-                names[column],
-            )
+        elif more := int((here & ~absent).sum()):
+            text = "%s without a face by %r: not observed"
+            log.info(text, plural(more, "row"), names[column])
             absent |= here
     return absent
 

@@ -214,7 +214,7 @@ def _frame_clock(table: Table, column: int, fps: float | None) -> Clock:
         fix = "Add a column time, or run facert convert with --in-fps."
         raise InputError(f"column {name}", "the rate of the frames", "none", fix)
     origin = 0.0 if name.strip().lower() == "frame" else float(values[0])
-    seconds = put_together((values - origin) / fps, table.numbers)
+    seconds = put_together((values - origin) / fps, table.numbers, table.place)
     return Clock(seconds, fps, column, origin / fps)
 
 
@@ -224,7 +224,7 @@ def _number_clock(table: Table, column: int, sparse: bool) -> Clock:
     unit = _unit_by_size(values) or stated or (1.0 if sparse else _unit_by_step(values))
     plain = name.strip().lower() == "time" and unit == 1.0 and abs(values[0]) < _LATE
     origin = 0.0 if plain else float(values[0])
-    seconds = put_together((values - origin) * unit, table.numbers)
+    seconds = put_together((values - origin) * unit, table.numbers, table.place)
     if not plain:
         start = f", {origin:.10g} for 0" if origin and not sparse else ""
         log.info(
@@ -302,7 +302,7 @@ def _text_clock(table: Table, column: int, fps: float | None, sparse: bool) -> C
         return code_clock(table, column, fps)
     seconds = seconds_of_texts(texts)
     log.info("%r is taken for times of the clock, from the first row on", name)
-    time = put_together(seconds - seconds[0], table.numbers)
+    time = put_together(seconds - seconds[0], table.numbers, table.place)
     return Clock(time, nominal_rate(time), column, float(seconds[0]))
 
 
@@ -311,7 +311,7 @@ def _code_clock(table: Table, column: int, fps: float | None) -> Clock:
     log.info("%r is taken for timecodes", table.names[column])
     clock = read_timecodes(codes_of_texts(table.texts[column]), fps)
     assert clock is not None  # they have FF, as was asked before
-    time = put_together(clock.seconds, table.numbers)
+    time = put_together(clock.seconds, table.numbers, table.place)
     if fps is not None and clock.counts_broken(fps):
         log.info("timecodes of %d a second: counted at %.6g", clock.count, fps)
         return Clock(time * (clock.count / fps), fps, column, start_timecode=clock.start(fps))

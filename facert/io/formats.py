@@ -192,8 +192,8 @@ def read_mesh(path: Path, shapes: str | None = None) -> Mesh:
     return mesh
 
 
-def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
-    """Write a take in the format that the name's ending asks for.
+def write_take_file(take: Take, path: Path, overwrite: bool = False) -> int:
+    """Write a take in the format that the name's ending asks for; the number of frames written.
 
     Formats that are played row by row get even rows, see `facert.data.resampling.evenly_spaced`.
 
@@ -212,6 +212,7 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> None:
         take = evenly_spaced(take) if missing else take
         take = held(take) if missing == "held" else take
     write("take", take, path, overwrite)
+    return len(take)
 
 
 def _warn_of_loss(take: Take, path: Path) -> None:

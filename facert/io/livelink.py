@@ -82,7 +82,7 @@ def read_livelink(path: Path, fps: float | None = None) -> Take:
         check_width(rows, header)
         clock = _clock(rows, fps)
         values = to_numbers(rows, header, range(2, len(header)))
-        kept, time = rising(clock.seconds, values)
+        kept, time = rising(clock.seconds, values, lambda row: f"line {rows[row].number}")
         rate = nominal_rate(time)
         if fps is not None and clock.is_exact:
             _require_agrees(fps, time)

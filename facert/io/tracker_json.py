@@ -20,7 +20,7 @@ from facert.data.arrays import FloatArray
 from facert.data.column_names import names_face, role_of_name
 from facert.data.columns import learnable
 from facert.data.take import Take
-from facert.data.text import listed
+from facert.data.text import listed, plural
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
@@ -142,7 +142,12 @@ def _weights(frames: Sequence[Frame]) -> list[str]:
     main = ranked[:1] if ranked and counts[ranked[0]] > plain else []
     facial = [key for key in ranked if key not in main and _is_of_face(key, frames)]
     used = main + facial
-    left_out = {key for frame in frames for key in (*frame.groups, *frame.others)} - set(used)
+    empty = sum(not any(map(frame.groups.get, used)) for frame in frames) if used else 0
+    if empty:
+        text = "%s without a face (no %s): not observed"
+        log.info(text, plural(empty, "frame"), listed(list(map(repr, used))))
+    unused = {key for frame in frames for key in frame.others} | set(filled)
+    left_out = unused - set(used)
     if left_out:
         log.info("left out, as no weights: %s", listed(sorted(map(repr, left_out))))
     return used

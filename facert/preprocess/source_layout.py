@@ -11,6 +11,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex
 from facert.data.take import Source, SourceKind
+from facert.data.text import listed, plural
 from facert.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -72,7 +73,10 @@ class SourceLayout:
         if absent and not quiet:
             log.warning("taken as not observed, as the take lacks them: %s", ", ".join(absent))
         if extra and not quiet:
-            log.info("%d names of the source are not in the model: passed over", extra)
+            known = set(index.places(present, "/source/names").tolist())
+            others = [repr(name) for place, name in enumerate(names) if place not in known]
+            text = "not in the model, passed over: %s of the source (%s)"
+            log.info(text, plural(extra, "name"), listed(others))
         seen = np.isin(self.names, present)
         places = np.zeros(len(self.names), dtype=np.int64)
         places[seen] = index.places(present, "/source/names")

@@ -177,3 +177,14 @@ def test_training_on_such_a_column_is_warned_of_once(caplog):
 def test_what_is_to_be_kept_must_be_there():
     with pytest.raises(InputError, match="--keep"):
         require_there(["confidence"], ["jawOpen"])
+
+
+def test_rows_that_two_flags_deny_are_counted_once(caplog):
+    caplog.set_level(logging.INFO)
+    values = np.random.default_rng(0).random((len(TIME), 3))
+    values[:, :2] = 1.0
+    values[5:9, :2] = 0.0
+    found = weight_columns(["success", "tracked", "jawOpen"], values, TIME)
+    assert found.absent.sum() == 4
+    assert "4 rows without a face by 'success'" in caplog.text
+    assert "by 'tracked'" not in caplog.text

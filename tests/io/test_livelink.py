@@ -277,7 +277,7 @@ def test_a_clock_that_is_set_back_goes_on(path, caplog, seconds):
     write(path, ["jawOpen"], codes, [["1", row] for row in range(180)])
     take = read_livelink(path)
     np.testing.assert_allclose(take.time, np.arange(180) / 30, atol=1e-9)
-    assert f"the clock steps back by {seconds} s at row 91" in caplog.text
+    assert f"the clock steps back by {seconds} s at line 92" in caplog.text
 
 
 @pytest.mark.parametrize("rows", [16, 29, 50])

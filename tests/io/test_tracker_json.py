@@ -285,3 +285,17 @@ def test_points_in_a_plane_are_no_weights(path):
     path.write_text(json.dumps([{"time": t, "landmarks": [{"x": 1, "y": t}]} for t, _ in STAMPS]))
     with pytest.raises(InputError, match="weights or markers"):
         read_take_file(path)
+
+
+def test_frames_without_a_face_are_counted_and_no_list_is_said_to_be_left_out(path, caplog):
+    caplog.set_level(logging.INFO)
+    faces = [{"categories": [{"categoryName": "jawOpen", "score": i / 40}]} for i in range(30)]
+    frames = [
+        {"timestamp": i / 30, "faceBlendshapes": [] if i in (7, 8) else [face]}
+        for i, face in enumerate(faces)
+    ]
+    path.write_text(json.dumps(frames))
+    take = read_take_file(path)
+    assert np.flatnonzero(np.isnan(take.source.values[:, 0])).tolist() == [7, 8]
+    assert "2 frames without a face" in caplog.text
+    assert "left out" not in caplog.text

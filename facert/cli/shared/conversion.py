@@ -66,13 +66,13 @@ def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overw
             return _write_rig(found, output, overwrite)
         if of_morphs:
             return _write_motion(_motion(found, wanted, changes), output, overwrite)
-    formats.write_take_file(found, output, overwrite)
-    return _content(found, output)
+    count = formats.write_take_file(found, output, overwrite)
+    return _content(found, count, output)
 
 
-def _content(take: Take, output: Path) -> str:
+def _content(take: Take, count: int, output: Path) -> str:
     """Description of what of a take was written: all, the poses, or else the source."""
-    frames = plural(len(take), "frame")
+    frames = plural(count, "frame")
     source = plural(len(take.source.names), take.source.kind[:-1])
     poses = plural(len(take.labels), "pose")
     if output.suffix.lower() in OWN_ENDINGS:
