@@ -62,7 +62,8 @@ def evenly_spaced(take: Take) -> Take:
     Frames that lie evenly stay as they are, missing ones come between them with nothing observed;
     others are resampled, which the log has.
 
-    Raises `InputError` where a pause is `LONGEST`, or there would be more than `MAX_FRAMES` frames.
+    Raises `InputError` where a pause is over `LONGEST`, or there would be more than `MAX_FRAMES`
+    frames.
     """
     _check_pauses(take.time)
     places = frames_at(take.time, take.fps, EVEN)
