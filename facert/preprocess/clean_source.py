@@ -15,6 +15,7 @@ from facert.data.take import Source, Take
 from facert.data.text import plural
 from facert.errors import InputError
 from facert.preprocess.faults import Reach, without_faults
+from facert.preprocess.faults.quantiles import quantile
 from facert.preprocess.motion.estimate import estimate_if_it_moves
 from facert.preprocess.neutral import Calibration, at_rest
 from facert.preprocess.source_layout import SourceLayout
@@ -24,6 +25,11 @@ log = logging.getLogger(__name__)
 FAR, ABSURD = 5.0, 1e6
 """Distances from the training take's mean, in normalised units, of which the log warns, and at
 which nothing can be computed."""
+UNLIKE = (20.0, 500.0)
+"""Weights so many times as large as usual in training, or as small, are percent instead of
+fractions, or the reverse: 100 times by a factor of five."""
+WITHIN = 2.5
+"""Most fractions are smaller than this."""
 
 
 @dataclass(frozen=True)
@@ -111,13 +117,17 @@ def clean_source(
         own = at_rest(observed.matrix, frames)
         rest = own.reshape(observed.values.shape[1:])
         X = Calibration.of(columns.pick(own), neutral, layout.kind).apply(X)
-    measured = units.apply(X)
+    measured, given = units.apply(X), X
     far = Reach.of(units, layout.kind).beyond(measured) if options.detect else None
     if far is not None:
         X, measured = np.where(far, np.nan, X), np.where(far, np.nan, measured)
         source = source.with_matrix(np.where(far, np.nan, source.matrix))
-        _warn_of_far(far, layout)
     _check_distance(measured)
+    other_unit = _other_unit(given, units.mean) if layout.kind == "weights" else ""
+    if other_unit:
+        log.warning("the source's weights are about %s", other_unit)
+    else:
+        _warn_of_distance(measured, far, layout)
     found = estimate_if_it_moves(X, take.time, options.sigma) if options.smooth else None
     if found is None:
         return CleanSource(source, rest, measured, measured)
@@ -125,6 +135,30 @@ def clean_source(
     input_variance = np.where(np.isnan(X), found.std / units.scale, 0.0) ** 2
     clean = units.apply(found.frames)
     return CleanSource(source, rest, measured, clean, found.std, input_variance)
+
+
+def _other_unit(weights: FloatArray, trained: FloatArray) -> str:
+    """How weights (T, d_x) differ by their unit from their means in training (d_x,); or nothing."""
+    sizes = np.abs(weights)
+    known = (trained != 0.0) & ~np.isnan(sizes).all(axis=0)
+    if not known.any():
+        return ""
+    usual, trained = np.nanmean(sizes[:, known], axis=0), np.abs(trained[known])
+    ratio, highest = float(np.median(usual / trained)), quantile(sizes[:, known].T, 0.98)
+    largest, expected = float(np.median(highest)), float(np.median(trained))
+    if UNLIKE[0] < ratio < UNLIKE[1] and largest > WITHIN:
+        return "100 times as large as in training: percent instead of fractions? Divide them by 100"
+    if UNLIKE[0] * ratio < 1.0 < UNLIKE[1] * ratio and largest < 1.0 < expected:
+        return "a hundredth of those in training: fractions, not percent? Multiply them by 100"
+    return ""
+
+
+def _warn_of_distance(measured: FloatArray, far: BoolArray | None, layout: SourceLayout) -> None:
+    """Warn of a source (T, d_x) that lies far off, and of values in it that are hidden for that."""
+    if far is not None:
+        _warn_of_far(far, layout)
+    if float(np.nanmedian(np.abs(measured))) > FAR:
+        log.warning("the source lies far from the training take: check units and head motion")
 
 
 def _warn_of_far(far: BoolArray, layout: SourceLayout) -> None:
@@ -141,7 +175,7 @@ def _warn_of_far(far: BoolArray, layout: SourceLayout) -> None:
 
 
 def _check_distance(frames: FloatArray) -> None:
-    """Check that frames in normalised units are a few units from zero at most.
+    """Check that frames in normalised units are not absurdly far from zero.
 
     Raises
     ------
@@ -156,5 +190,3 @@ def _check_distance(frames: FloatArray) -> None:
             f"{distance:.1e} times its largest deviation away",
             "Check units and origin.",
         )
-    if float(np.nanmedian(np.abs(frames))) > FAR:
-        log.warning("the source lies far from the training take: check units and head motion")
