@@ -31,6 +31,7 @@ class Role(Enum):
     FLAG = "a flag"
     ABSENCE = "a flag of absence"
     SUBJECT = "a subject's number"
+    SIZE = "a size"
 
 
 def _by_word(texts: Mapping[_Key, str]) -> dict[str, _Key]:
@@ -61,7 +62,8 @@ _ROLES = _by_word(
         Role.CONFIDENCE: "confidence conf score quality probability prob certainty reliability "
         "likelihood",
         Role.FLAG: "success successful succeeded tracked tracking valid validity detected "
-        "detection found visible visibility present presence status state ok",
+        "detection found visible visibility present presence status state ok "
+        "done checked approved reviewed note notes comment comments remark remarks",
         Role.ABSENCE: "lost missing absent invalid untracked",
         Role.CLOCK: "time times timestamp timestamps timecode tc stamp clock epoch unix elapsed "
         "datetime date pts utc ts recorded created",

@@ -30,6 +30,11 @@ _LINEAR = 1e-2  # of the range, by which a clock strays from a line
 _FEW = 4  # rows that copy the frames' numbers exactly
 _TWO_VALUED = 2  # more columns of two values than this are weights: lips of a puppet, visemes
 _LISTED = 12
+# Words of what says nothing of a face when it is 0, and of a picture's size.
+_VAGUE = frozenset(("status", "state", "done", "checked", "approved", "reviewed", "note", "notes",
+                    "comment", "comments", "remark", "remarks"))  # fmt: skip
+_SIZES = frozenset(("width", "height", "size", "image", "img", "frame", "video", "camera",
+                    "resolution", "w", "h", "x", "y", "px"))  # fmt: skip
 # Seconds, frames at the usual rates and smaller units, a second or a frame.
 _RATES = np.array((24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0))
 _SLOPES = np.concatenate([10.0 ** np.arange(-9, 10, 3), _RATES, 1 / _RATES, 1e3 / _RATES])
@@ -97,6 +102,9 @@ def roles_of(
         if role is not None and (not is_letter(names[column]) or rises(values[:, column]))
     }
     nameless = [c for c, name in enumerate(names) if c not in roles and not names_face(name)]
+    sizes = [column for column in nameless if _is_size(names[column], values[:, column])]
+    roles |= dict.fromkeys(sizes, Role.SIZE)
+    nameless = [column for column in nameless if column not in roles]
     if sparse:
         copies = (c for c in nameless if _restates(values[:, c], time))
         return roles | dict.fromkeys(copies, Role.CLOCK)
@@ -104,6 +112,13 @@ def roles_of(
     flags = [c for c in nameless if len(names[c]) > 1 and _is_two_valued(values[:, c])]
     roles |= {column: role for column, role in shaped.items() if role is not None}
     return roles | (dict.fromkeys(flags, Role.FLAG) if len(flags) <= _TWO_VALUED else {})
+
+
+def _is_size(name: str, column: FloatArray) -> bool:
+    """Whether a column is the width or height of a picture: by name, constant, and no weight."""
+    found = {*name_words(name)}
+    named = bool(found & {"width", "height", "size", "resolution"}) and found <= _SIZES
+    return named and bool((column == column[0]).all() and column[0] > _WEIGHTS)
 
 
 def rises(column: FloatArray) -> bool:
@@ -185,7 +200,7 @@ def _states_absence(name: str, role: Role) -> bool:
     found = {*name_words(name)}
     if role is Role.CONFIDENCE:
         return bool(found & {"confidence", "conf", "probability"})
-    vague = bool(found & {"status", "state"}) and not found & {"tracking", "tracked"}
+    vague = bool(found & _VAGUE) and not found & {"tracking", "tracked"}
     return role_of_name(name) is role and not vague
 
 

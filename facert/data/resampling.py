@@ -16,7 +16,7 @@ import numpy as np
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rate import AGREES, frames_at, frames_shown, rate_shown, standard_rate
 from facert.data.take import Source, Take
-from facert.data.text import plural
+from facert.data.text import listed, plural
 from facert.data.timecode import recounted
 from facert.errors import InputError
 
@@ -251,14 +251,18 @@ def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, I
     places, first = np.unique(nearest[order], return_index=True)
     chosen = order[first]
     good = ~between[places] & ~paused[places] & (shifts[chosen] <= 0.5 / fps + _SAME)
-    _log_moves(shifts[chosen[good]], len(alone) - int(good.sum()))
+    _log_moves(shifts[chosen[good]], np.setdiff1d(alone, alone[chosen[good]]), take)
     return places[good], alone[chosen[good]]
 
 
-def _log_moves(shifts: FloatArray, lost: int) -> None:
+def _log_moves(shifts: FloatArray, lost: IntArray, take: Take) -> None:
     moved = shifts[shifts > _SAME]
     if len(moved):
         poses, most = plural(len(moved), "pose"), 1e3 * moved.max()
         log.warning("%s moved by up to %.0f ms to the nearest frame", poses, most)
-    if lost:
-        log.warning("left out %s without a free frame near by", plural(lost, "pose"))
+    if len(lost):
+        frames = listed([f"{frame} ({take.time[frame]:.3f} s)" for frame in lost.tolist()])
+        text = (
+            "left out %s without a free frame near by (another pose or a pause is there): frame %s"
+        )
+        log.warning(text, plural(len(lost), "pose"), frames)

@@ -98,6 +98,17 @@ class _Column:
         left_out = (minutes % 10 > 0) & (seconds == 0) & (self.frames < dropped_numbers(count))
         return not left_out.any()
 
+    def skips(self, count: int) -> bool:
+        """Whether rows of every frame leave out just the numbers that drop-frame does."""
+        if not can_drop(count) or self.thousandths or self.in_parts:
+            return False
+        minutes = self.whole // 60
+        into = np.flatnonzero(np.diff(minutes) == 1) + 1
+        taken = np.diff(count * self.whole + self.frames)
+        skipped = np.where(minutes[into] % 10 > 0, dropped_numbers(count), 0)
+        full = bool((minutes[into] % 10 > 0).any() and np.median(taken) == 1)
+        return full and bool((taken[into - 1] == 1 + skipped).all())
+
     def usual(self, count: int) -> float:
         """The usual step from row to row, in FF: within seconds, where any is."""
         steps = np.diff(self.numbers(count))
@@ -149,6 +160,9 @@ def read_timecodes(codes: Sequence[Code], fps: float | None = None) -> TimecodeC
         return None
     column = _column(codes)
     count = _count(column, fps)
+    if not column.may_drop and column.skips(count):
+        column = replace(column, may_drop=True)
+        log.info("timecodes leave out the first numbers of minutes, as drop-frame does")
     drop = column.drops(count)
     if column.may_drop and can_drop(count) and not drop:
         log.warning("timecodes have numbers that drop-frame leaves out: not taken for drop-frame")

@@ -226,7 +226,7 @@ def _number_clock(table: Table, column: int, sparse: bool) -> Clock:
     origin = 0.0 if plain else float(values[0])
     seconds = put_together((values - origin) * unit, table.numbers, table.place)
     if not plain:
-        start = f", {origin:.10g} for 0" if origin and not sparse else ""
+        start = f", its first, {origin:.15g}, for 0" if origin and not sparse else ""
         log.info(
             "%r is taken for %s%s; facert convert --in-fps overrules it",
             name,

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import csv
 import io
+import logging
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,10 +28,11 @@ from facert.data.arrays import FloatArray
 from facert.data.columns import learnable, require_there
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_columns
+from facert.data.text import printable
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.coordinates import markers_among
-from facert.io.guarded import read_beginning, read_text
+from facert.io.guarded import encoding_of, read_beginning, read_text
 from facert.io.lines import (
     MAX_HEADER,
     Line,
@@ -46,6 +48,8 @@ from facert.io.table_take import Reading, take_of_table, unlogged
 
 CURVE = "iteration,objective,gradient_norm,seconds"
 """The first line of the curve of a training, a table that is never read."""
+
+log = logging.getLogger("facert")
 
 _MARKS = {"weights": "time (weights)", "markers": "time (markers)"}
 _LONGEST = max(map(len, _MARKS.values()))
@@ -97,7 +101,7 @@ def read_table(
 
 def is_marked(path: Path) -> bool:
     """Whether the first cell of a table states what its columns are."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
+    with path.open(encoding=encoding_of(path), errors="replace") as file:
         return _is_marked(file.read(2 * _LONGEST))
 
 
@@ -114,6 +118,8 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
         file.write(plain if own else _header([mark, *names]))
         file.write(_body(take.time, values).replace("nan", ""))
+    if take.start_timecode:
+        log.info("a table has no start timecode: %s is left out", printable(take.start_timecode))
 
 
 def bears_mark(path: Path) -> bool:

@@ -48,14 +48,20 @@ def read_beginning(path: Path, most: int = 2**12) -> bytes:
         return file.read(most)
 
 
-def read_text(path: Path) -> str:
-    """Read a UTF-8 text file, with or without a byte order mark.
+def encoding_of(path: Path) -> str:
+    """The encoding of a text file by its byte order mark: UTF-16, as Excel writes it, or UTF-8."""
+    utf_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    return "utf-16" if read_beginning(path, 2) in utf_16 else "utf-8-sig"
 
-    Raises `InputError` when the file is missing, too large or not UTF-8.
+
+def read_text(path: Path) -> str:
+    """Read a text file of UTF-8, with or without a byte order mark, or of UTF-16 with its mark.
+
+    Raises `InputError` when the file is missing, too large or neither.
     """
     try:
-        return moderate_file(path).read_text(encoding="utf-8-sig")
-    except (UnicodeDecodeError, OSError) as error:
+        return moderate_file(path).read_text(encoding=encoding_of(path))
+    except (UnicodeError, OSError) as error:
         found, fix = "something else", "Save it as UTF-8."
         raise InputError("file", "UTF-8 text that can be read", found, fix) from error
 

@@ -13,7 +13,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.text import plural
 from facert.errors import InputError
-from facert.io.guarded import existing_file, read_text
+from facert.io.guarded import encoding_of, existing_file, read_text
 
 MAX_HEADER = 2**20
 _PREAMBLE = 20  # lines before the header, at most
@@ -51,7 +51,7 @@ def read_lines(path: Path, separator: str) -> list[Line]:
 
 def read_header(path: Path) -> tuple[str, ...]:
     """The cells of the first line with names, which shows the kind of a CSV file."""
-    with existing_file(path).open(encoding="utf-8-sig", errors="replace") as file:
+    with existing_file(path).open(encoding=encoding_of(path), errors="replace") as file:
         lines = [file.readline(MAX_HEADER).rstrip("\r\n") for _ in range(_PREAMBLE + 1)]
     line = next(filter(str.strip, _without_preamble(lines)), "")
     separator = separator_of(line)

@@ -1,5 +1,6 @@
 """Clocks without a clock's name: by shape, in an index without a name, beside a rate."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from facert.data.take import Take
 from facert.errors import InputError
-from facert.io.formats import read_take_file
+from facert.io.formats import read_take_file, write_take_file
 
 ROWS = np.delete(np.arange(200), [20, 21, 22, 90, 91])
 
@@ -89,3 +90,48 @@ def test_a_column_that_states_a_broken_rate_counts_timecodes(tmp_path: Path) -> 
 def test_an_empty_name_to_keep_is_refused_as_such(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected the name of a column"):
         read_take_file(write(tmp_path / "a.csv", "time", seconds()), keep=("",))
+
+
+@pytest.mark.parametrize(("count", "gone"), [(30, 2), (60, 4)])
+def test_drop_frame_with_colons_shows_in_the_numbers_that_are_missing(
+    tmp_path: Path, count: int, gone: int
+) -> None:
+    before = [f"01:01:59:{frame:02d}" for frame in range(count)]
+    after = [f"01:02:00:{frame:02d}" for frame in range(count)]
+    take = read_take_file(write(tmp_path / "a.csv", "timecode", before + after[gone:]))
+    assert take.fps == pytest.approx(count / 1.001)
+    np.testing.assert_allclose(np.diff(take.time), 1.001 / count)
+    for rest in (after, after[1:], after[gone + 1 :]):
+        assert read_take_file(write(tmp_path / "a.csv", "timecode", before + rest)).fps == count
+    ten = [one.replace("01:01", "01:09") for one in before]
+    later = [one.replace("01:02", "01:10") for one in after[gone:]]
+    assert read_take_file(write(tmp_path / "a.csv", "timecode", ten + later)).fps == count
+
+
+def test_notes_and_the_size_of_a_picture_are_no_weights(tmp_path: Path) -> None:
+    more = {name: ["1920"] * 195 for name in ("width", "image_height")}
+    more |= {name: ["0"] * 195 for name in ("done", "checked", "approved", "notes")}
+    take = read_take_file(write(tmp_path / "a.csv", "time", seconds(), **more))
+    assert take.source.names == ("mouthSmile",)
+    assert take.source.valid.all()
+    low = {"width": ["0.5"] * 195, "mouthWidth": ["2"] * 195}
+    take = read_take_file(write(tmp_path / "a.csv", "time", seconds(), **low))
+    assert take.source.names == ("width", "mouthWidth", "mouthSmile")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_a_table_of_utf_16_is_read_by_its_mark(tmp_path: Path, encoding: str) -> None:
+    path = write(tmp_path / "a.csv", "time", seconds())
+    path.write_text(path.read_text(), encoding=encoding)
+    assert read_take_file(path).source.names == ("mouthSmile",)
+
+
+def test_a_table_says_that_it_has_no_start_timecode(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    take = read_take_file(write(tmp_path / "a.csv", "time", seconds()))
+    write_take_file(take, tmp_path / "b.csv")
+    assert "start timecode" not in caplog.text
+    write_take_file(replace(take, start_timecode="01:00:00:00"), tmp_path / "c.csv")
+    assert "no start timecode: 01:00:00:00 is left out" in caplog.text

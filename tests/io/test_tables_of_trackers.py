@@ -320,7 +320,7 @@ def test_poses_by_seconds_are_those_of_the_take_or_of_its_clock(path, caplog):
     take = read_take_file(path)
     write(path, {"time": [0.1, 0.2], "jaw": [0, 1]})
     assert labelled(take, read_poses(path)).labels.tolist() == [3, 6]
-    assert "begins at" not in caplog.text.split("0.2 for 0")[1]
+    assert "begins at" not in caplog.text.split("0.2, for 0")[1]
     write(path, {"time": [0.3, 0.4], "jaw": [0, 1]})
     assert labelled(take, read_poses(path)).labels.tolist() == [9, 12]
     assert "from its first frame on, not by its clock, which begins at 0.2 s" in caplog.text
