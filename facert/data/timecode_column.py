@@ -227,7 +227,9 @@ def _is_running(fractions: Sequence[str], column: _Column) -> bool:
             log.info(text, rate / 1.001, rate)
         return running
     whole = turned.any() and taken[turned].min() > np.median(taken)  # parts that came to a whole FF
-    return bool((np.diff(numbers) % turn == 1).all()) and numbers[0] in (0, 1) and not whole
+    moves = np.ptp(column.frames) > 0 or np.ptp(column.whole) > 0
+    counts_rows = bool(moves and (np.diff(numbers) % turn == 1).all())
+    return counts_rows and numbers[0] in (0, 1) and not whole
 
 
 def _count(column: _Column, fps: float | None) -> int:
