@@ -25,7 +25,7 @@ from facert.demo.build import ACTOR
 from facert.demo.character import CONTROLS, animate
 from facert.demo.expressions import ACTIVATIONS
 from facert.demo.head import make_head, marker_vertices
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.mesh.morphs import Morphs
 from facert.preprocess.faults import without_faults
 from facert.preprocess.head_motion import stabilise

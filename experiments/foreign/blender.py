@@ -28,7 +28,7 @@ from experiments.foreign.trial import Trial, messages
 from facert import Source, Take
 from facert.data.arrays import FloatArray
 from facert.io.formats import read_rig_file, read_take_file, write_take_file
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.io.importers import script
 from facert.mesh.morphs import rig_morphs
 

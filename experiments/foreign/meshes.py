@@ -23,7 +23,7 @@ from experiments.foreign.face import (
 from experiments.foreign.trial import Trial
 from facert.data.arrays import FloatArray
 from facert.io.formats import read_mesh, read_rig_file
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.io.usd import write_usd
 from facert.mesh.morphs import rig_morphs
 

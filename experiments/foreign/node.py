@@ -23,7 +23,7 @@ from experiments.foreign.face import (
 )
 from experiments.foreign.trial import Trial
 from facert.io.formats import read_rig_file, read_take_file
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.mesh.morphs import rig_morphs
 
 PACK, TRANSFORM, VALIDATOR = "gltfpack", "gltf-transform", "gltf-validator"

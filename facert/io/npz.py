@@ -31,8 +31,8 @@ from facert.data.rate import nominal_rate, standard_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, reading
-from facert.io.clock_column import in_seconds
 from facert.io.guarded import existing_file, parsing
+from facert.io.tables.clock_column import in_seconds
 
 NO_TARGET = ""
 """Asks for the source alone of a file with several targets."""

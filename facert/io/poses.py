@@ -19,14 +19,14 @@ from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.clock_column import clock_of
-from facert.io.csv_table import is_marked
 from facert.io.formats import read_any, require_take
 from facert.io.lines import read_csv, read_header
-from facert.io.livelink import is_livelink
-from facert.io.table import Table, table_of_lines
-from facert.io.table_take import controls_of, unlogged
-from facert.io.tracker_json import read_json_table
+from facert.io.tables.clock_column import clock_of
+from facert.io.tables.csv_table import is_marked
+from facert.io.tables.livelink import is_livelink
+from facert.io.tables.table import Table, table_of_lines
+from facert.io.tables.table_take import controls_of, unlogged
+from facert.io.tables.tracker_json import read_json_table
 
 log = logging.getLogger("facert")
 

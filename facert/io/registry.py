@@ -72,17 +72,17 @@ FORMATS = (
     ),
     Format(
         (".livelink.csv",),  # read as .csv: the header decides
-        write={"take": "livelink.write_livelink"},
+        write={"take": "tables.livelink.write_livelink"},
         missing="marked",
-        mark="livelink.bears_mark",
+        mark="tables.livelink.bears_mark",
         reads="Live Link Face",
         writes="poses (else source weights), if they are ARKit's; rows are even in time",
     ),
     Format(
         (".csv",),
-        read={"take": "csv_table.read_csv_take"},
-        write={"take": "csv_table.write_table"},
-        mark="csv_table.bears_mark",
+        read={"take": "tables.csv_table.read_csv_take"},
+        write={"take": "tables.csv_table.write_table"},
+        mark="tables.csv_table.bears_mark",
         about=" of Live Link Face, another tracker or plain",
         reads="Live Link Face, or a table with a header: a clock or `frame`, `NAME.x NAME.y "
         "NAME.z` or weights; of OpenFace, MediaPipe, Vicon and others; separated by commas, or by "
@@ -91,7 +91,7 @@ FORMATS = (
     ),
     Format(
         (".json",),
-        read={"take": "tracker_json.read_json_take"},
+        read={"take": "tables.tracker_json.read_json_take"},
         write={"take": "curves.write_curves"},
         missing="held",
         mark="curves.bears_mark",
@@ -103,13 +103,13 @@ FORMATS = (
     Format(
         (".txt",),
         {"take": "facecap.read_facecap"},
-        mark="csv_table.bears_mark",  # of the curve of a training
+        mark="tables.csv_table.bears_mark",  # of the curve of a training
         about=" of Face Cap",
         reads="Face Cap",
     ),
     Format(
         (".tsv", ".tab"),
-        {"take": "csv_table.read_csv_take"},
+        {"take": "tables.csv_table.read_csv_take"},
         reads="the same as `.csv`, between tabs",
     ),
     Format((".c3d",), {"take": "c3d.read_c3d"}, reads="markers"),
@@ -122,29 +122,29 @@ FORMATS = (
     Format(
         (".glb", ".gltf"),
         read={
-            "take": "gltf_take.read_gltf_take",
-            "rig": "gltf_rig.read_gltf_rig",
-            "mesh": "gltf_rig.read_gltf_mesh",
+            "take": "gltf.take.read_gltf_take",
+            "rig": "gltf.rig.read_gltf_rig",
+            "mesh": "gltf.rig.read_gltf_mesh",
         },
-        kind_of="gltf_take.kind_of",
+        kind_of="gltf.take.kind_of",
         reads="a rig of morph targets, at rest as the scene and its skeleton place it; their "
         "animation as a take",
     ),
     Format(
         (".vrm",),
-        read={"take": "gltf_take.read_gltf_take", "rig": "gltf_rig.read_gltf_rig"},
-        kind_of="gltf_take.kind_of",
+        read={"take": "gltf.take.read_gltf_take", "rig": "gltf.rig.read_gltf_rig"},
+        kind_of="gltf.take.kind_of",
         reads="the same of a VRM avatar; with `--shapes expressions` its expressions",
     ),
     Format(
         (".vrma",),
-        {"take": "gltf_take.read_gltf_take"},
+        {"take": "gltf.take.read_gltf_take"},
         reads="a take of the expressions of a VRM animation",
     ),
     Format(
         (".glb",),
-        write={"morphs": "glb.write_glb"},
-        mark="gltf.bears_mark",
+        write={"morphs": "gltf.writer.write_glb"},
+        mark="gltf.document.bears_mark",
         writes="by `convert`: a rig, a take with `--rig`, a mesh sequence",
     ),
     Format(
@@ -217,7 +217,7 @@ def format_of(path: Path, use: Use, *kinds: Kind) -> Format | None:
 
 def function(name: str) -> Callable[..., Any]:
     """The function of that name, see `Format`."""
-    module, _, attribute = name.partition(".")
+    module, _, attribute = name.rpartition(".")
     found: Callable[..., Any] = getattr(import_module(f"facert.io.{module}"), attribute)
     return found
 

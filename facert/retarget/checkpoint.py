@@ -12,8 +12,8 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.version import CREATED_BY
 from facert.errors import InputError
-from facert.io.csv_table import CURVE
 from facert.io.registry import require_replaceable
+from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import read_tensors, write_tensors
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State

@@ -12,7 +12,7 @@ import trimesh
 
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Controls, Source, Take
-from facert.io.gltf_rig import read_gltf_mesh
+from facert.io.gltf.rig import read_gltf_mesh
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.io.rig import read_rig, write_rig
 from facert.io.take import write_take

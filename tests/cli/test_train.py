@@ -10,7 +10,7 @@ import pytest
 
 import facert as api
 from facert.cli.commands.train import _shown
-from facert.io.csv_table import CURVE
+from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import write_tensors
 from facert.retarget.checkpoint import checkpoint_path
 

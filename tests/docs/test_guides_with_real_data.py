@@ -12,7 +12,7 @@ from following import DOCS, follow, stand_in
 import facert
 from facert.data.arrays import FloatArray
 from facert.data.rig import Rig
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.mesh.morphs import Morphs
 
 pytestmark = [pytest.mark.real, pytest.mark.slow]

@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as arrays
 
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.io.csv_table import read_table, write_table
+from facert.io.tables.csv_table import read_table, write_table
 
 
 @pytest.fixture

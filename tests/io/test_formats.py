@@ -13,7 +13,7 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError, OutputExistsError
 from facert.io import formats
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.io.poses import read_poses
 from facert.io.registry import require_output
 from facert.mesh.morphs import rig_morphs

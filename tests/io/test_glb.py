@@ -17,7 +17,7 @@ import trimesh
 
 from facert.data.rig import Mesh, MeshSequence
 from facert.errors import InputError, OutputExistsError
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.mesh.morphs import Morphs, compact_morphs
 
 BALL = trimesh.creation.icosphere(2, radius=9.0)

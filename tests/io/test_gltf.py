@@ -17,11 +17,11 @@ from facert.data.labelling import weights_as_poses
 from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.io.formats import read_mesh
-from facert.io.glb import write_glb
-from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
-from facert.io.gltf_take import kind_of, read_gltf_take
-from facert.io.livelink import read_livelink
+from facert.io.gltf.rig import read_gltf_mesh, read_gltf_rig
+from facert.io.gltf.take import kind_of, read_gltf_take
+from facert.io.gltf.writer import write_glb
 from facert.io.npz import read_npz_rig
+from facert.io.tables.livelink import read_livelink
 from facert.mesh.morphs import rig_morphs
 from facert.render.faces import control_settings
 

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.errors import InputError
-from facert.io.gltf_rig import read_gltf_rig
+from facert.io.gltf.rig import read_gltf_rig
 
 RNG = np.random.default_rng(0)
 HEAD = np.float32(RNG.random((39, 3)) * [0.2, 0.3, 0.2] + [-0.1, 1.5, 0])

@@ -11,8 +11,8 @@ import pytest
 from gltf_files import Builder
 
 from facert.errors import InputError
-from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
-from facert.io.gltf_take import read_gltf_take
+from facert.io.gltf.rig import read_gltf_mesh, read_gltf_rig
+from facert.io.gltf.take import read_gltf_take
 
 TRIANGLE = np.eye(3, dtype=np.float32)
 SMILE, BLINK = np.float32([[0, 1, 0]] * 3), np.float32([[0, 0, 2]] * 3)

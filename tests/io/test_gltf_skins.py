@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from facert.data.rig import Rig
 from facert.errors import InputError
-from facert.io.gltf_rig import read_gltf_mesh, read_gltf_rig
+from facert.io.gltf.rig import read_gltf_mesh, read_gltf_rig
 
 HEAD = np.float32([[-0.1, 1.5, 0], [0.1, 1.5, 0], [-0.1, 1.7, 0.02]])
 JAW = np.float32([[0, -0.03, 0], [0, -0.03, 0], [0, 0, 0.01]])

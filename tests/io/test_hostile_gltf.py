@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.errors import InputError
-from facert.io.gltf import open_gltf
-from facert.io.gltf_rig import read_gltf_rig
-from facert.io.gltf_take import read_gltf_take
+from facert.io.gltf.document import open_gltf
+from facert.io.gltf.rig import read_gltf_rig
+from facert.io.gltf.take import read_gltf_take
 
 BLENDER = Path(__file__).parent / "files" / "blender.glb"  # made and exported in Blender 5.0
 

@@ -13,7 +13,7 @@ from facert.data.take import Controls, Source, Take
 from facert.data.timecode import format_timecode, parse_timecode, timecode
 from facert.errors import InputError
 from facert.io.formats import read_take_file
-from facert.io.livelink import read_livelink, write_livelink
+from facert.io.tables.livelink import read_livelink, write_livelink
 
 DAY = 24 * 3600 * 60_000
 

@@ -20,7 +20,7 @@ from facert.data.take import Source, Take
 from facert.errors import OutputExistsError, OutputKeptError
 from facert.io.atomic import replacing
 from facert.io.formats import write_rig_file, write_take_file
-from facert.io.glb import write_glb
+from facert.io.gltf.writer import write_glb
 from facert.io.mesh_sequence import write_mesh_sequence
 from facert.io.registry import FORMATS, is_foreign, require_replaceable
 from facert.io.take import holds_recording, holds_result

@@ -25,7 +25,9 @@ def test_endings_are_those_of_a_kind() -> None:
 
 
 def test_one_declaration_brings_a_format_into_all_lists(tmp_path, monkeypatch) -> None:
-    new = Format((".dat",), {"take": "csv_table.read_table"}, about=" of a test", reads="a test")
+    new = Format(
+        (".dat",), {"take": "tables.csv_table.read_table"}, about=" of a test", reads="a test"
+    )
     monkeypatch.setattr(registry, "FORMATS", (*FORMATS, new))
     path = tmp_path / "a.dat"
     path.write_text("time,a\n0,1\n0.02,1\n")

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
-from facert.io.csv_table import read_table, write_table
 from facert.io.formats import read_take_file, write_take_file
 from facert.io.poses import read_poses
+from facert.io.tables.csv_table import read_table, write_table
 
 FRAMES = 12
 TIME = np.arange(FRAMES) / 30

@@ -12,7 +12,7 @@ from gltf_files import Builder
 
 from facert.errors import InputError
 from facert.io.formats import read_mesh, read_rig_file, read_take_file
-from facert.io.gltf_rig import read_gltf_rig
+from facert.io.gltf.rig import read_gltf_rig
 
 TRIANGLE = np.eye(3, dtype=np.float32)
 SMILE, BLINK = np.float32([[0, 1, 0]] * 3), np.float32([[0, 0, 2]] * 3)

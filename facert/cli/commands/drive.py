@@ -136,7 +136,7 @@ def _explained(error: InputError, mesh: Mesh, take: Take, auto: bool, fit: Fit) 
 
 def _write(sequence: MeshSequence, output: Path, tolerance: float, overwrite: bool) -> str:
     """Write in the format of the name's ending; return how large and how far off morphs are."""
-    from facert.io.glb import write_glb
+    from facert.io.gltf.writer import write_glb
     from facert.io.mesh_sequence import write_mesh_sequence
     from facert.mesh.morphs import compact_morphs
 

@@ -15,8 +15,8 @@ from typing import Any
 
 from facert.data.text import listed, printable
 from facert.errors import InputError
-from facert.io.gltf import Document
-from facert.io.vrm import names_of_single_targets
+from facert.io.gltf.document import Document
+from facert.io.gltf.vrm import names_of_single_targets
 
 log = logging.getLogger("facert")
 

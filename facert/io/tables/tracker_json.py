@@ -1,4 +1,4 @@
-"""Takes out of the JSON of trackers, in whatever layout; see `facert.io.json_frames`.
+"""Takes out of the JSON of trackers, in whatever layout; see `facert.io.tables.json_frames`.
 
 Beside the weights a frame may have its time, its number or a flag; what else is in it is left out,
 and the log names it. Curves as Audio2Face writes them are read by `facert.io.curves`.
@@ -24,9 +24,9 @@ from facert.data.text import listed, plural
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
-from facert.io.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
-from facert.io.table import Table
-from facert.io.table_take import Reading, take_of_table
+from facert.io.tables.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
+from facert.io.tables.table import Table
+from facert.io.tables.table_take import Reading, take_of_table
 
 log = logging.getLogger("facert")
 

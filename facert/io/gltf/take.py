@@ -13,10 +13,10 @@ from facert.data.arrays import FloatArray
 from facert.data.rate import AGREES, nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.io.gltf import MAX_VALUES, Document, open_gltf
-from facert.io.gltf_names import target_names
+from facert.io.gltf.document import MAX_VALUES, Document, open_gltf
+from facert.io.gltf.names import target_names
+from facert.io.gltf.vrm import animated_expressions
 from facert.io.registry import Kind
-from facert.io.vrm import animated_expressions
 
 log = logging.getLogger("facert")
 

@@ -31,7 +31,6 @@ from facert.data.take import Source, Take, named_columns
 from facert.data.text import printable
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
-from facert.io.coordinates import markers_among
 from facert.io.guarded import encoding_of, read_beginning, read_text
 from facert.io.lines import (
     MAX_HEADER,
@@ -41,10 +40,11 @@ from facert.io.lines import (
     read_header,
     to_numbers,
 )
-from facert.io.livelink import is_livelink, read_livelink
-from facert.io.marker_header import marker_header
-from facert.io.table import Table, is_number, is_text, table_of_lines
-from facert.io.table_take import Reading, take_of_table, unlogged
+from facert.io.tables.coordinates import markers_among
+from facert.io.tables.livelink import is_livelink, read_livelink
+from facert.io.tables.marker_header import marker_header
+from facert.io.tables.table import Table, is_number, is_text, table_of_lines
+from facert.io.tables.table_take import Reading, take_of_table, unlogged
 
 CURVE = "iteration,objective,gradient_norm,seconds"
 """The first line of the curve of a training, a table that is never read."""

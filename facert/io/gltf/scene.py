@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.io.gltf import MAX_VALUES, Document
+from facert.io.gltf.document import MAX_VALUES, Document
 
 MAX_SETS = 8
 """Most sets of four joints a vertex."""

@@ -19,10 +19,10 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh, Rig
 from facert.data.text import printable
 from facert.errors import InputError
-from facert.io.gltf import MAX_VALUES, Document, open_gltf
-from facert.io.gltf_names import target_names
-from facert.io.gltf_scene import Scene, displaced, mirrored, scene_of, transformed
-from facert.io.vrm import Bind, expressions_of, looks_back
+from facert.io.gltf.document import MAX_VALUES, Document, open_gltf
+from facert.io.gltf.names import target_names
+from facert.io.gltf.scene import Scene, displaced, mirrored, scene_of, transformed
+from facert.io.gltf.vrm import Bind, expressions_of, looks_back
 
 log = logging.getLogger("facert")
 

@@ -21,9 +21,9 @@ from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take
 from facert.data.text import listed, plural
 from facert.errors import InputError
-from facert.io.clock_column import Clock, clock_of
-from facert.io.coordinates import Markers, markers_among
-from facert.io.table import Table
+from facert.io.tables.clock_column import Clock, clock_of
+from facert.io.tables.coordinates import Markers, markers_among
+from facert.io.tables.table import Table
 
 log = logging.getLogger("facert")
 

@@ -26,7 +26,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.version import MARK
 from facert.errors import InputError, reading
 from facert.io.curves import parse_json_object
-from facert.io.gltf_compression import MESHOPT, decompressed
+from facert.io.gltf.compression import MESHOPT, decompressed
 from facert.io.guarded import moderate_file, parsing, read_beginning
 
 MAX_VALUES = 2**27

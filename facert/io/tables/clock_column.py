@@ -25,8 +25,8 @@ from facert.data.rate import nominal_rate, standard_rate, whole_count
 from facert.data.timecode import LIVE_LINK_RATE, TICKS, has_thousandths, parse_timecode
 from facert.data.timecode_column import read_timecodes
 from facert.errors import InputError
-from facert.io.clock_text import codes_of_texts, is_time, seconds_of_texts
-from facert.io.table import Table
+from facert.io.tables.clock_text import codes_of_texts, is_time, seconds_of_texts
+from facert.io.tables.table import Table
 
 log = logging.getLogger("facert")
 
