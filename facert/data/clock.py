@@ -22,6 +22,7 @@ ORDINARY = 1.5
 
 HOUR = 3600.0
 
+_DROP_HOUR = 107892 * 1001 / 30000  # seconds of an hour of drop-frame timecodes
 _MISSING = 60.0  # seconds without rows, where a clock was set back by whole hours
 _AROUND = 15  # rows on either side that show how the clock goes there
 _ENOUGH = 3  # rows that go on after a step back
@@ -87,8 +88,10 @@ def put_together(
 
 def _size(size: float) -> float:
     """How far a clock was set back: whole hours where rows missing there account for the rest."""
-    hours = HOUR * np.ceil(size / HOUR)
-    return hours if hours - size < _MISSING else size
+    hours = np.ceil(size / HOUR)
+    if abs(size - _DROP_HOUR * hours) < _SAME * hours:
+        return size
+    return HOUR * hours if HOUR * hours - size < _MISSING else size
 
 
 def _was_set(seconds: FloatArray, values: FloatArray, row: int, end: int, usual: float) -> bool:

@@ -96,3 +96,10 @@ def test_a_clock_that_rises_is_as_it_is(caplog) -> None:
 def test_seconds_that_are_none_are_left_to_others() -> None:
     clock = np.array([0.0, np.nan, 0.05, 0.0])
     assert rising(clock, noise(4))[1] is clock
+
+
+def test_an_hour_of_drop_frame_is_a_little_less(caplog) -> None:
+    step = 1001 / 30000
+    true = 9000 + np.arange(180) * step
+    clock = true - 107892 * step * (np.arange(180) >= 90)
+    np.testing.assert_allclose(rising(clock, noise(180))[1], true, atol=1e-6)

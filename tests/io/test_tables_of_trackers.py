@@ -232,6 +232,29 @@ def test_markers_are_spelled_in_many_ways(path, spelling, upper):
     np.testing.assert_array_equal(source.values, positions.round(6))
 
 
+@pytest.mark.parametrize("spelling", ["{}_{}", "{}[{}]", "{}.{}"])
+def test_axes_may_be_numbers(path, spelling):
+    positions = (50 * rng.normal(size=(3, 3)) + rng.normal(size=(FRAMES, 3, 3))).round(4)
+    columns = {
+        spelling.format(name, i): positions[:, m, i]
+        for m, name in enumerate(("chin", "lipL", "browR"))
+        for i in range(3)
+    }
+    write(path, {"time": SECONDS, **columns})
+    source = read_take_file(path).source
+    assert source.names == ("chin", "lipL", "browR")
+    np.testing.assert_array_equal(source.values, positions)
+    write(path, {"time": SECONDS, **{name: abs(values) for name, values in columns.items()}})
+    assert read_take_file(path).source.kind == "weights"
+
+
+@pytest.mark.parametrize("spelling", ["{}{}", "{}{} (mm)"])
+def test_a_capital_may_stand_before_the_axis(path, spelling):
+    columns = {spelling.format(n, a): 90 * WEIGHTS[:, 0] for n in ("lipL", "lipR") for a in "XYZ"}
+    write(path, {"time": SECONDS, **columns})
+    assert read_take_file(path).source.names == ("lipL", "lipR")
+
+
 @pytest.mark.parametrize("names", [("X_{}", "Y_{}", "Z_{}"), ("x{}", "y{}", "z{}")])
 def test_axes_may_stand_before_a_number(path, names):
     positions = 50 * rng.normal(size=(FRAMES, 3, 68))

@@ -1,8 +1,9 @@
 """Columns that are the coordinates of markers, in the spellings of many programs.
 
 ``NAME.x``, ``NAME_x``, ``NAME:X``, ``NAME X (mm)``, ``NAME.tx``, ``NAME.posX``,
-``NAME.Translate X``, ``NAME[x]``, ``nameX``, ``NAMEX``, ``X_0``. Three such columns are a marker
-where every column is one of three, and their values can be positions; else they are weights.
+``NAME.Translate X``, ``NAME[x]``, ``nameX``, ``NAMEX``, ``X_0``, ``NAME_0``. Three such columns are
+a marker where every column is one of three, and their values can be positions; else they are
+weights.
 """
 
 from __future__ import annotations
@@ -41,8 +42,11 @@ _GLUED = (
     re.compile(r"(?P<name>.*[^\W_A-Z])(?P<axis>[XYZ])"),
     re.compile(r"(?P<name>[^\W_a-z]{2,})(?P<axis>[XYZ])"),
     re.compile(r"(?P<name>[^\W_]{3,})(?P<axis>[xyz])"),
+    re.compile(rf"(?P<name>.*[^\W_])(?P<axis>[XYZ]){_UNIT}"),
 )
-_SPELLINGS = (_OWN, _POSITIONS, _PLAIN, *_OTHERS, *_GLUED)
+_NUMBERED = re.compile(r"(?P<name>.+?)[._:\s\[(-](?P<axis>[012])[\])]?")
+_NUMBERS = str.maketrans("012", "xyz")
+_SPELLINGS = (_OWN, _POSITIONS, _PLAIN, *_OTHERS, *_GLUED, _NUMBERED)
 _ROTATIONS = {"rot", "rotation", "rotate", "angle", "euler", "quat", "quaternion", "scale"}
 
 _ENOUGH = 10  # rows that show of what kind values are
@@ -74,6 +78,8 @@ def markers_among(names: Sequence[str], values: FloatArray, sure: bool = False) 
             continue
         markers = Markers(tuple(found), np.array(list(found.values()), dtype=np.int64), unit)
         if markers.columns.size == len(names):
+            if spelling is _NUMBERED and not sure and not _around_origin(markers, values):
+                return None
             if not sure and not _are_positions(markers, values, spelling in _GLUED):
                 return None
             if spelling not in (_OWN, _PLAIN) and not sure:
@@ -91,7 +97,8 @@ def _triples(spelling: re.Pattern[str], names: Sequence[str]) -> tuple[dict[str,
     units = set()
     for column, match in enumerate(matches):
         if match is not None:
-            place.setdefault((match["name"], match["axis"].lower()), column)
+            axis = match["axis"].lower().translate(_NUMBERS)
+            place.setdefault((match["name"], axis), column)
             groups = match.groupdict()
             units.add((groups.get("unit") or groups.get("unit_") or "").lower())
     different = dict.fromkeys(name for name, _ in place)
@@ -115,6 +122,12 @@ def _are_positions(markers: Markers, values: FloatArray, glued: bool) -> bool:
         markers.names[0],
     )
     return False
+
+
+def _around_origin(markers: Markers, values: FloatArray) -> bool:
+    """Whether values lie on both sides of 0, farther than weights: numbers alone name no axes."""
+    positions = values[:, markers.columns]
+    return bool((positions < -_IN_WEIGHTS).any() and (positions > _IN_WEIGHTS).any())
 
 
 def _like_weights(markers: Markers, values: FloatArray) -> bool:
