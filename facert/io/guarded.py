@@ -51,7 +51,8 @@ def read_beginning(path: Path, most: int = 2**12) -> bytes:
 def encoding_of(path: Path) -> str:
     """The encoding of a text file by its byte order mark: UTF-16, as Excel writes it, or UTF-8."""
     utf_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-    return "utf-16" if read_beginning(path, 2) in utf_16 else "utf-8-sig"
+    beginning = read_beginning(path, 3)  # a mark alone is no text
+    return "utf-16" if len(beginning) > 2 and beginning[:2] in utf_16 else "utf-8-sig"
 
 
 def read_text(path: Path) -> str:
