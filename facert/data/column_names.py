@@ -60,13 +60,14 @@ _ROLES = _by_word(
         Role.RATE: "fps rate framerate delta dt latency delay duration exposure interval "
         "process processing inference",
         Role.CONFIDENCE: "confidence conf score quality probability prob certainty reliability "
-        "likelihood",
-        Role.FLAG: "success successful succeeded tracked tracking valid validity detected "
+        "likelihood konfidenz confiance confianza confidenza 信頼度 置信度",
+        Role.FLAG: "erkannt success successful succeeded tracked tracking valid validity detected "
         "detection found visible visibility present presence status state ok "
         "done checked approved reviewed note notes comment comments remark remarks",
         Role.ABSENCE: "lost missing absent invalid untracked",
         Role.CLOCK: "time times timestamp timestamps timecode tc stamp clock epoch unix elapsed "
-        "datetime date pts utc ts recorded created",
+        "datetime date pts utc ts recorded created smpte "
+        "zeit zeitstempel temps horodatage tiempo 時間 時刻 时间 时间戳",
         Role.FRAME: "frame frames",
         Role.COUNTER: "index idx row rows id ids uid seq sequence number num no nr count counter "
         "unnamed packet record progress",
@@ -79,7 +80,7 @@ _BESIDE = _set(
     "sensor recv received receive send sent server client arrival relative rel absolute abs since "
     "start code of in the per arkit mediapipe raw data app hw cpu gpu user person subject actor "
     "tracker total wall media hardware software recording "
-    "at on sub overall mean average day"
+    "at on sub overall mean average day clip gesicht visage cara"
 )
 # A name that ends so is no shape's, whatever stands in front.
 _LAST = _set("confidence conf timestamp timecode probability")

@@ -33,9 +33,9 @@ COUNTS = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 100, 120)
 """How many FF may make a second."""
 
 _RARE = (16, 18, 72, 90, 96, 144, 240)  # where the rows leave no other
-_LIKELY = (30, 60, 25, 24, 50, 48, 100, 120)  # of rows that count their own frames
-_LIKELY_FINER = (60, 30, 25, 24, 50, 48, 100, 120)  # of rows some FF apart
-_WHOLE_SECOND = (24, 25, 48, 50)  # rows from FF 0 to the last: a second and no more
+_LIKELY = (30, 60, 25, 24, 50, 48, 120, 100)  # of rows that count their own frames
+_LIKELY_FINER = (60, 30, 25, 24, 50, 48, 120, 100)  # of rows some FF apart
+_WHOLE_SECOND = (24, 25, 48, 50, 100)  # rows from FF 0 to the last: a second and no more
 _MILLISECONDS = 1000
 _GOES_ON = 0.5  # of a usual step, by which the step to the next second differs at most
 _EXACT = 0.05

@@ -75,6 +75,14 @@ CLOCKS = {
 }
 
 
+def test_clocks_confidences_and_flags_have_names_in_other_languages() -> None:
+    words = "Konfidenz confiance_visage 信頼度", "Zeitstempel_ms horodatage 时间", "Gesicht_erkannt"
+    for names, role in zip(words, (Role.CONFIDENCE, Role.CLOCK, Role.FLAG), strict=True):
+        assert {role_of_name(name) for name in names.split()} == {role}
+    assert role_of_name("clip_progress") is Role.COUNTER
+    assert not any(map(role_of_name, ("Zeitlupe", "caraFeliz", "cara", "mouthClip")))
+
+
 @pytest.mark.parametrize("kind", CLOCKS)
 def test_a_column_that_rises_like_a_clock_is_none_of_the_weights(kind, caplog):
     caplog.set_level(logging.INFO, "facert")

@@ -82,6 +82,11 @@ def test_what_remains_possible_is_told_and_the_rate_decides(caplog) -> None:
     assert not caplog.records
 
 
+@pytest.mark.parametrize(("rows", "count"), [(96, 120), (100, 100), (112, 120)])
+def test_most_of_a_second_of_many_frames_is_of_120_and_a_whole_one_of_100(rows, count) -> None:
+    assert clock_of(written(count, count, rows)).count == count
+
+
 def test_the_apps_sixtieths_with_thousandths_need_no_second(caplog) -> None:
     caplog.set_level(logging.INFO)
     clock = clock_of(["10:00:00:01.250", "10:00:00:03.250", "10:00:00:05.249"])
