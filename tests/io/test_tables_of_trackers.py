@@ -447,7 +447,7 @@ def test_a_time_that_is_there_twice_costs_its_row(path, caplog):
     assert "dropped 1 row" in caplog.text
 
 
-@pytest.mark.parametrize("blank", ["NA", "null", "NaN", "", "None"])
+@pytest.mark.parametrize("blank", ["NA", "null", "NaN", "", "None", "-", "#NUM!", "1.#QNAN"])
 def test_cells_without_a_value_are_blank(path, blank):
     write(path, {"time": SECONDS, "jawOpen": [blank, *WEIGHTS[1:, 0]], "smile": WEIGHTS[:, 1]})
     assert np.isnan(read_take_file(path).source.values[0, 0])

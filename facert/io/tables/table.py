@@ -14,7 +14,8 @@ from facert.io.lines import Line, check_width, to_numbers
 
 _TRUTHS = {
     **{"true": "1", "false": "0", "yes": "1", "no": "0", "": "nan"},
-    **dict.fromkeys(("na", "n/a", "#n/a", "null", "none"), "nan"),
+    **dict.fromkeys(("na", "n/a", "#n/a", "null", "none", "-", "--"), "nan"),
+    **dict.fromkeys(("#num!", "#value!", "#div/0!", "1.#qnan", "-1.#ind", "-1.#qnan"), "nan"),
 }
 # No number, whatever the language: it has a letter, or the parts of a time of day or a date.
 _TEXT = re.compile(r".*([^\W\d_]|:|\d;\d).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
