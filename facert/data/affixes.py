@@ -68,7 +68,7 @@ class Affix:
 
     @property
     def tells_apart(self) -> bool:
-        """Whether it says a side or a place, by which the names of one face are told apart."""
+        """Whether it says a side or a place, which distinguishes the names of one face."""
         return any(word in SIDES or word in _PLACES for word in self.words)
 
     def core(self, name: str) -> str | None:

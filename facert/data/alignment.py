@@ -156,7 +156,7 @@ class _Removed:
 
     @property
     def is_word(self) -> bool:
-        """Whether it tells names of one face apart, or what remains without it is but a number."""
+        """Whether it distinguishes names of one face, or what remains of one is but a number."""
         if self.is_named:
             return any(word in SIDES for word in self.affix.words)
         cores = filter(None, map(self.affix.core, self.met))
@@ -181,8 +181,8 @@ def _holds(found: Alignment, wanted: Sequence[str], among: Sequence[str]) -> boo
 def _are_exchanged(removed: Sequence[_Removed]) -> bool:
     """Whether affixes of the two lists say nothing of the face, so that they need not agree.
 
-    Of two suffixes that is known of kinds only: ``.tx`` and ``.ty``, or ``_min`` and ``_max``, tell
-    two controls apart.
+    Of two suffixes that is known of kinds only: ``.tx`` and ``.ty``, or ``_min`` and ``_max``,
+    distinguish two controls.
     """
     suffixes = [Affix(after=one.affix.after) for one in removed if one.affix.after]
     if len(suffixes) > 1 and not all(suffix.is_kind for suffix in suffixes):

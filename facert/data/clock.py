@@ -1,7 +1,7 @@
 """The clock of a recording, made to rise: set back while the recording went on, or rows astray.
 
 A clock that daylight saving or network time sets back goes on by its usual steps from there. A row
-that comes late, or twice, does not: after it the clock is where it was. What tells them apart is
+that comes late, or twice, does not: after it the clock is where it was. What distinguishes them is
 whether the clock goes on from the row that steps back, or jumps to where it would be without it.
 """
 

@@ -24,7 +24,7 @@ log = logging.getLogger("facert")
 ENOUGH = 10
 """Fewest rows that show a shape: a clock, a counter or a flag."""
 
-_WEIGHTS = 1.5  # no clock is told from a ramp of a weight within this range
+_WEIGHTS = 1.5  # within this range a clock looks like a ramp of a weight
 _BEYOND = 1e5
 _LINEAR = 1e-2  # of the range, by which a clock strays from a line
 _FEW = 4  # rows that copy the frames' numbers exactly

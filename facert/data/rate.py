@@ -53,8 +53,8 @@ def nominal_rate(time: FloatArray) -> float:
     """Frames a second by the usual spacing of the frames.
 
     It is whole where that is within 1 %; or 29.97 and the like, where the recording is long enough
-    to tell that from 30. `ONE_FRAME` for times (T,) that do not rise, or a single frame; gaps do
-    not count.
+    to distinguish that from 30. `ONE_FRAME` for times (T,) that do not rise, or a single frame;
+    gaps do not count.
     """
     if not _rises(time):
         return ONE_FRAME
@@ -152,7 +152,7 @@ def _centred(values: FloatArray, run: IntArray) -> FloatArray:
 
 
 def _broken_or_whole(shown: float, whole: float, unsure: float) -> float:
-    """A whole rate, or the broken one below it where the times tell the two apart."""
+    """A whole rate, or the broken one below it where the times distinguish the two."""
     broken = 1000.0 * whole / 1001.0
     if broken not in BROKEN:
         return whole

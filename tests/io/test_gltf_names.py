@@ -49,6 +49,10 @@ def under_another_key(document: Any) -> None:
     document.meshes[0].extras = {"morphTargetNames": NAMES}
 
 
+def under_a_key_of_two_words(document: Any) -> None:
+    document.meshes[0].extras = {"target_names": NAMES}
+
+
 def in_each_target(document: Any) -> None:
     for target, name in zip(document.meshes[0].primitives[0].targets, NAMES, strict=True):
         target["extras"] = {"name": name}
@@ -72,6 +76,7 @@ def in_extras_of_accessors(document: Any) -> None:
         in_primitive,
         in_primitive_rather_than_in_a_mesh_of_other_names,
         under_another_key,
+        under_a_key_of_two_words,
         in_each_target,
         in_accessors,
         in_extras_of_accessors,

@@ -20,7 +20,7 @@ from facert.io.gltf.vrm import names_of_single_targets
 
 log = logging.getLogger("facert")
 
-_KEYS = ("targetNames", "morphTargetNames", "blendShapeNames")
+_KEYS = ("targetNames", "target_names", "morphTargetNames", "blendShapeNames")
 _REST = ("basis", "base", "neutral", "rest")
 """Shape keys that are no targets: some writers name them with the others."""
 _NUMBERED = re.compile(r"(buffer|accessor|attribute|position|target|morph|shape|mesh|prim)", re.I)

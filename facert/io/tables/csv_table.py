@@ -176,7 +176,7 @@ def _require_names(header: Sequence[str], rows: Sequence[Line]) -> None:
 
 
 def _body(time: FloatArray, values: FloatArray) -> str:
-    """The rows of a table; times are written in full where ten digits do not tell them apart."""
+    """The rows of a table; times are written in full where ten digits do not distinguish them."""
     body = io.StringIO()
     formats = ["%.10g" if _is_short(time) else "%.17g", *["%.10g"] * values.shape[1]]
     np.savetxt(body, np.column_stack([time, values]), fmt=formats, delimiter=",")
@@ -184,7 +184,7 @@ def _body(time: FloatArray, values: FloatArray) -> str:
 
 
 def _is_short(time: FloatArray) -> bool:
-    """Whether ten digits tell times (T,) apart."""
+    """Whether ten digits distinguish times (T,)."""
     short = np.array([float(f"{one:.10g}") for one in (time[0], time[-1])])
     return bool(np.abs(short - time[[0, -1]]).max() <= 1e-7 and (np.diff(time) > 1e-5).all())
 

@@ -68,7 +68,7 @@ def read_livelink(path: Path, fps: float | None = None) -> Take:
     """Read a Live Link Face CSV as a take whose source is weights, named as ARKit does.
 
     Rows without a face, and rows that do not come after the one before, are dropped and counted
-    in the log. `fps` is the rate of the rows, where it is known: it helps to tell what FF count.
+    in the log. `fps` is the rate of the rows, where it is known: it helps to find what FF count.
 
     Raises `InputError` naming the file and the line that is at fault.
     """
