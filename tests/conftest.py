@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,12 +20,9 @@ DEFAULT_DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
 
 @pytest.fixture(autouse=True)
-def level_of_log() -> Iterator[None]:
-    """The level of facert's log, which a command sets for its process, back after each test."""
-    log = logging.getLogger("facert")
-    before = log.level
-    yield
-    log.setLevel(before)
+def level_of_log() -> None:
+    """No level of facert's log that an earlier command has set for its process."""
+    logging.getLogger("facert").setLevel(logging.NOTSET)
 
 
 @pytest.fixture(scope="session")
