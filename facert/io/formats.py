@@ -79,10 +79,8 @@ def read_any(
         log.warning("%s: read as %s, which it is by its content", path.name, found.endings[0])
     held = function(found.kind_of)(path, kind) if found.kind_of else next(iter(found.read))
     reader = function(found.read[held])
-    if held == "take" and target and not _has_targets(found):
-        able = ", ".join(e for one in FORMATS if _has_targets(one) for e in one.endings)
-        fix = "Leave it out: there is nothing to choose."
-        raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
+    if held == "take" and target:
+        _require_targets(found, path)
     fps = None if fps is None else standard_rate(fps)
     options = {"target": target, "shapes": shapes, "fps": fps or or_fps, "keep": keep}
     options |= {"align": align, "sparse": sparse}
@@ -101,6 +99,14 @@ def _at_rate(found: Take | Rig, fps: float, asked: bool, path: Path) -> Take | R
             found_instead = "a rig, which has no frames"
             raise InputError("--in-fps", "a take", found_instead, "Leave it out.")
         return found if asked and found.fps == fps else counted_at(found, fps)
+
+
+def _require_targets(found: Format, path: Path) -> None:
+    """Refuse to choose a target where a take has but one."""
+    if not _has_targets(found):
+        able = ", ".join(e for one in FORMATS if _has_targets(one) for e in one.endings)
+        fix = "Leave it out: there is nothing to choose."
+        raise InputError("--target", f"a take in {able}", path.suffix, fix, where=str(path))
 
 
 def _has_targets(one: Format) -> bool:
