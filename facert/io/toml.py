@@ -1,8 +1,12 @@
-"""TOML files that a person writes: any table; the regions of a face.
+"""TOML files that a person writes: any table; the regions of a face; drivers of nodes.
 
 [brows-and-eyes]
 markers = ["browLeft", "browRight"]
 controls = ["browInnerUp", "eyeBlinkLeft"]
+
+[[eyeLookInLeft]]
+node = "eye_L"
+rotate = [0, 25, 0]
 """
 
 from __future__ import annotations
@@ -14,11 +18,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from facert.data.drivers import Drivers
 from facert.data.regions import Regions
 from facert.errors import InputError, reading
 from facert.io.guarded import read_text
 
 REGIONS_EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
+DRIVERS_EXAMPLE = '[[eyeLookInLeft]] with node = "eye_L" and rotate = [0, 25, 0] below'
 WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -43,6 +49,15 @@ def read_regions(path: Path) -> Regions:
     """
     with reading(path):
         return Regions.of(read_toml(path, REGIONS_EXAMPLE))
+
+
+def read_drivers(path: Path) -> Drivers:
+    """The drivers in a file: tables of a control, each with a node and how it moves.
+
+    Raises `InputError` when the file is missing, too large, not TOML, or holds anything else.
+    """
+    with reading(path):
+        return Drivers.of(read_toml(path, DRIVERS_EXAMPLE))
 
 
 def regions_text(regions: Regions) -> str:
