@@ -50,10 +50,9 @@ class Driver:
         for key in ("factor", "offset"):
             if not _is_number(getattr(self, key)):
                 raise self._wrong(key, "a number", getattr(self, key))
-        if not self.moves and not self.property:
+        if not self.moves() and not self.property:
             raise self._wrong(self.node, "rotate, translate or property", "none, or zeros")
 
-    @property
     def moves(self) -> bool:
         """Whether it turns or shifts the node, which is more than to set a property."""
         return self.rotate != NOWHERE or self.translate != NOWHERE
@@ -70,7 +69,6 @@ class Driver:
         fix = 'Write it as in node = "eye_L", rotate = [0, 25, 0].'
         return InputError(f"[[{self.control}]] {key}", expected, f"{found!r}", fix)
 
-    @property
     def table(self) -> dict[str, Any]:
         """The table that makes this driver, as plain values; what is as by default is left out."""
         held = {one.name: (getattr(self, one.name), one.default) for one in fields(self)[1:]}
@@ -107,13 +105,13 @@ class Drivers:
     @property
     def nodes(self) -> tuple[str, ...]:
         """The names of the nodes that are turned or shifted, each once."""
-        return tuple(dict.fromkeys(one.node for one in self.entries if one.moves))
+        return tuple(dict.fromkeys(one.node for one in self.entries if one.moves()))
 
     @property
     def tables(self) -> dict[str, list[dict[str, Any]]]:
         """The tables that `of` takes, as plain values that JSON can hold."""
         return {
-            control: [one.table for one in self.entries if one.control == control]
+            control: [one.table() for one in self.entries if one.control == control]
             for control in self.controls
         }
 
