@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from facert.posing.suggested_frames import suggest_frames
     from facert.retarget.retargeter import Retargeter, load
     from facert.retarget.training import train
+    from facert.retarget.verdict import Verdict, judge
     from facert.settings import Settings
 
 __version__ = VERSION
@@ -42,7 +43,9 @@ __all__ = [
     "Settings",
     "Source",
     "Take",
+    "Verdict",
     "complete_pose",
+    "judge",
     "load",
     "read_rig",
     "read_take",
@@ -60,7 +63,9 @@ _HOMES = {
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),
+    "Verdict": ("facert.retarget.verdict", "Verdict"),
     "complete_pose": ("facert.posing.completed_pose", "complete_pose"),
+    "judge": ("facert.retarget.verdict", "judge"),
     "load": ("facert.retarget.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),
     "read_take": ("facert.io.formats", "read_take_file"),

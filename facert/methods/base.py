@@ -114,6 +114,10 @@ class Method(Protocol):
         """
         ...
 
+    def unclipped(self) -> Self:
+        """The trained method without limits on its poses; itself where it has none of its own."""
+        ...
+
     def on(self, device: str) -> Self:
         """The trained method, whose `predict` computes on a device, ``"cpu"`` or ``"cuda"``.
 

@@ -22,9 +22,10 @@ then keeps the weights together (Breiman 1996, Stacked Regressions).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from scipy.optimize import nnls
@@ -164,6 +165,14 @@ class Auto(Regression):
     """Processes and factors, blended."""
 
     map_type = BlendMap
+    map_: BlendMap
+
+    def unclipped(self) -> Self:
+        """The same method without the limits of its experts; see `Method.unclipped`."""
+        free = copy(self)
+        ends = np.full_like(self.map_.range, UNBOUNDED)
+        free.map_ = replace(self.map_, range=ends * [[-1.0], [1.0]])
+        return free
 
     def _learn(self, labelled: Labelled, unlabelled: Unlabelled) -> tuple[BlendMap, TrainingReport]:
         _, poses = stacked(labelled, unlabelled)

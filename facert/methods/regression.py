@@ -143,6 +143,10 @@ class Regression(ABC):
             variance = variance + np.nan_to_num(input_variance) @ self.response_**2
         return X, variance
 
+    def unclipped(self) -> Self:
+        """Return the method itself, which has no limits. See `Method.unclipped`."""
+        return self
+
     def on(self, device: str) -> Self:
         """Return the method itself, which computes on the CPU alone. See `Method.on`."""
         self._stay_on_cpu(device, "maps")

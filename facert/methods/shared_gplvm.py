@@ -143,6 +143,10 @@ class SemiSupervisedSGPLVM:
         there.to_poses_ = partial(map_to_target, self.target_.on(found))
         return there
 
+    def unclipped(self) -> Self:
+        """Return the method itself, which has no limits; see `Method.unclipped`."""
+        return self
+
     def stream(self) -> Stream:
         """Begin to map frames one after the other, with the temporal term of Eq. (14)."""
         return _SharedStream(self)

@@ -123,9 +123,9 @@ def clean_source(
         X, measured = np.where(far, np.nan, X), np.where(far, np.nan, measured)
         source = source.with_matrix(np.where(far, np.nan, source.matrix))
     _check_distance(measured)
-    other_unit = _other_unit(given, units.mean) if layout.kind == "weights" else ""
-    if other_unit:
-        log.warning("the source's weights are about %s", other_unit)
+    unit = other_unit(given, units.mean) if layout.kind == "weights" else ""
+    if unit:
+        log.warning("the source's weights are about %s", unit)
     else:
         _warn_of_distance(measured, far, layout)
     found = estimate_if_it_moves(X, take.time, options.sigma) if options.smooth else None
@@ -137,7 +137,7 @@ def clean_source(
     return CleanSource(source, rest, measured, clean, found.std, input_variance)
 
 
-def _other_unit(weights: FloatArray, trained: FloatArray) -> str:
+def other_unit(weights: FloatArray, trained: FloatArray) -> str:
     """How weights (T, d_x) differ by their unit from their means in training (d_x,); or nothing."""
     sizes = np.abs(weights)
     known = (trained != 0.0) & ~np.isnan(sizes).all(axis=0)

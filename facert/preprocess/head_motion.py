@@ -214,13 +214,28 @@ def _rigid(
     seen = (~np.isnan(points[:, :, 0])).astype(np.float64)
     motion = align(shape, points, seen)
     for _ in range(SHAPES):
-        for _ in range(REWEIGHTED):
-            away = np.linalg.norm(motion.undo(points) - shape, axis=2)
-            ordinary = np.nanquantile(away[known], ORDINARY) + np.finfo(float).tiny
-            weights = seen / (1.0 + np.nan_to_num(away / (STRAY * ordinary)) ** 2) ** 2
-            motion = align(shape, points, weights)
+        motion, weights = _reweighted(shape, points, seen, known, motion)
         shape = np.nanmedian(motion.undo(points)[known], axis=0)
     return shape, align(shape, points, weights)
+
+
+def rigid_motion(shape: FloatArray, points: FloatArray) -> RigidMotion:
+    """Rigid motion of each frame from a shape (m, 3) to points (T, m, 3), but for what strays."""
+    seen = np.ones(points.shape[:2])
+    first = align(shape, points, seen)
+    return _reweighted(shape, points, seen, np.ones(len(points), dtype=np.bool_), first)[0]
+
+
+def _reweighted(
+    shape: FloatArray, points: FloatArray, seen: FloatArray, known: BoolArray, motion: RigidMotion
+) -> tuple[RigidMotion, FloatArray]:
+    """The motion to points (T, m, 3) from a first guess of it, and the weights that it is by."""
+    for _ in range(REWEIGHTED):
+        away = np.linalg.norm(motion.undo(points) - shape, axis=2)
+        ordinary = np.nanquantile(away[known], ORDINARY) + np.finfo(float).tiny
+        weights = seen / (1.0 + np.nan_to_num(away / (STRAY * ordinary)) ** 2) ** 2
+        motion = align(shape, points, weights)
+    return motion, weights
 
 
 def _pose(motion: RigidMotion, known: BoolArray, reference: int | Literal["mean"]) -> RigidMotion:

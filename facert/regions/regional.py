@@ -190,9 +190,18 @@ class Regional:
 
     def on(self, device: str) -> Self:
         """A copy with every region's method on the device; see `Method.on`."""
-        there = copy(self)
-        there.parts_ = [replace(part, method=part.method.on(device)) for part in self.parts_]
-        return there
+        return self._with([part.method.on(device) for part in self.parts_])
+
+    def unclipped(self) -> Self:
+        """A copy with every region's method without limits; see `Method.unclipped`."""
+        return self._with([part.method.unclipped() for part in self.parts_])
+
+    def _with(self, methods: Sequence[Method]) -> Self:
+        """A copy with other methods for the regions."""
+        other = copy(self)
+        parts = zip(self.parts_, methods, strict=True)
+        other.parts_ = [replace(part, method=method) for part, method in parts]
+        return other
 
     def stream(self) -> Stream:
         """Begin to map frames one after the other, a stream a region."""

@@ -55,19 +55,33 @@ def relative_residuals(
         Usual variance of each column in the training take.
     kind : {"markers", "weights"}
     """
+    return relative_lengths(unexplained(frames, posed), variance, kind)
+
+
+def unexplained(frames: FloatArray, posed: FloatArray) -> FloatArray:
+    """What posed frames (l, d) leave of frames (T, d), the residual r above."""
     centre = posed.mean(axis=0)
     square = (posed - centre).T @ (posed - centre)
     ridge = max(RIDGE * float(np.trace(square)) / len(posed), np.finfo(np.float64).tiny)
-    residual = np.linalg.solve(square / ridge + np.eye(len(square)), (frames - centre).T).T
+    return np.linalg.solve(square / ridge + np.eye(len(square)), (frames - centre).T).T
+
+
+def relative_lengths(residuals: FloatArray, variance: FloatArray, kind: SourceKind) -> FloatArray:
+    """Lengths of residuals (T, d) by marker or weight relative to its usual motion, (T, n)."""
     size = 3 if kind == "markers" else 1
-    lengths = np.linalg.norm(residual.reshape(len(frames), -1, size), axis=2)
+    lengths = np.linalg.norm(residuals.reshape(len(residuals), -1, size), axis=2)
     motion = np.sqrt(variance.reshape(-1, size).sum(axis=1))
     return np.asarray(lengths / np.maximum(motion, STILL))
 
 
+def over_names(amounts: FloatArray) -> FloatArray:
+    """RMS over markers or weights of relative lengths (T, n), (T,); beyond `NEW` a frame is new."""
+    return np.asarray(np.sqrt(np.mean(amounts**2, axis=1)))
+
+
 def novelty_warning(residuals: FloatArray, names: Sequence[str]) -> str | None:
     """Warning of frames unlike the posed ones, by `relative_residuals` (T, n); None if few are."""
-    new = np.sqrt(np.mean(residuals**2, axis=1)) > NEW
+    new = over_names(residuals) > NEW
     if new.mean() < LEAST_SHARE:
         return None
     amounts = np.mean(residuals[new] ** 2, axis=0)

@@ -1,0 +1,166 @@
+"""Reasons that lie in the poses that came out: clipped controls, uncertainty, jumps, idle ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.resampling import PAUSE
+from facert.data.take import Take
+from facert.data.text import listed, plural
+from facert.retarget.model import TrainedModel
+from facert.retarget.reasons import Reason, found_in, level_of, most
+
+CUT = 0.1
+"""A control is clipped where its prediction went beyond its bound by this share of its range."""
+CLIPPED = (0.02, 0.25)
+"""Shares of the frames with a clipped control: to look at, and bad."""
+UNSURE = (0.12, 0.25)
+"""Standard deviations of poses relative to the controls' ranges: to look at, and bad."""
+UNSURE_SHARE = (0.05, 0.4)
+"""Shares of frames that are unsure."""
+JUMP = 0.25
+"""A pose jumps that leaves its neighbours by this share of the controls' ranges, RMS."""
+JUMPS = (1, 20)
+"""Jumps a minute."""
+RESTING = 0.25
+"""An end of a range that is nearer to the usual pose than this share of it is one of rest."""
+REACHED = 1e-6
+"""A control is at its bound that is so near to it, by its range: files round."""
+STILL = 0.01
+"""A control that moves by less than this share of its range is at rest."""
+
+
+def ranges_of(model: TrainedModel) -> FloatArray:
+    """How far each control goes in the poses that the model knows, or by its limits, (P,)."""
+    declared = model.controls.limits
+    known = None if model.poses is None else np.ptp(model.poses, axis=0)
+    if known is not None and known.any():
+        return np.asarray(known)
+    if declared is not None and np.isfinite(declared).all():
+        return np.asarray(np.ptp(declared, axis=1))
+    return np.full(len(model.controls.names), 4.0 * model.target_units.scale)
+
+
+def relative_to(ranges: FloatArray, amounts: FloatArray) -> FloatArray:
+    """RMS over the controls of amounts (T, P) relative to that of their ranges (P,), (T,)."""
+    size = float(np.sqrt(np.mean(ranges**2))) or 1.0
+    return np.asarray(np.sqrt(np.mean(amounts**2, axis=1)) / size)
+
+
+def pose_reasons(result: Take, model: TrainedModel) -> tuple[list[Reason], FloatArray]:
+    """Reasons in the poses of a result, and how unsure each frame is, (T,)."""
+    assert result.params is not None  # retargeted
+    ranges = ranges_of(model)
+    unsure = np.zeros(len(result)) if result.std is None else relative_to(ranges, result.std)
+    unsure = np.nan_to_num(unsure)  # somebody's pose has no deviation
+    reasons = [
+        *_clipped(result, model, ranges),
+        *_unsure(unsure, result.time),
+        *_jumps(result, ranges),
+        *_idle(result, model, ranges),
+    ]
+    return reasons, unsure
+
+
+def _clipped(result: Take, model: TrainedModel, ranges: FloatArray) -> Iterator[Reason]:
+    """Controls whose predictions were cut at a bound that is no rest."""
+    beyond = beyond_bounds(result, model)
+    if beyond is None:
+        return
+    cut = beyond > CUT * ranges
+    mask = np.asarray(cut.any(axis=1))
+    if not mask.any():
+        return
+    shares = cut.mean(axis=0)
+    farthest = np.max(beyond / np.where(ranges > 0.0, ranges, np.inf), axis=0)
+    worst = int(shares.argmax())
+    names = most(shares, model.controls.names)
+    text = f"{names} cut flat, by up to {farthest[worst]:.0%} of the range, "
+    declared = model.controls.limits is not None
+    cure = "the rig's limits are reached: widen them, or a gain below 1 by --controls"
+    if not declared:
+        cure = "pose the strongest expression as well, or train with --limits none"
+    level = level_of(float(mask.mean()), *CLIPPED)
+    text += found_in(mask, result.time)
+    yield Reason("clipped controls", level, text, cure, np.flatnonzero(mask))
+
+
+def beyond_bounds(result: Take, model: TrainedModel) -> FloatArray | None:
+    """How far predictions went beyond the bounds that they were clipped to, (T, P), in their units.
+
+    Ends of a control's range at which it rests do not count: a prediction there is a little below
+    as often as above. None where there are no bounds, or the result has not the model's source.
+    """
+    bounds, params = model.bounds, result.params
+    if bounds is None or params is None or result.source.names != model.layout.names:
+        return None
+    known = bounds if model.poses is None else model.poses.T
+    rest = np.median(known, axis=1)[:, None]
+    ends = np.where(
+        np.abs(bounds - rest) > RESTING * np.ptp(bounds, axis=1)[:, None], bounds, np.nan
+    )
+    reached = np.abs(params[:, :, None] - ends) <= REACHED * np.ptp(bounds, axis=1)[:, None]
+    rows = np.flatnonzero(reached.any(axis=(1, 2)))
+    beyond = np.zeros(params.shape)
+    if len(rows):
+        frames = model.source_units.apply(result.source.matrix[rows])
+        free = model.target_units.undo(model.method.unclipped().predict(frames).Y)
+        low, high = ends.T
+        over = np.fmax(free - high, low - free)  # NaN where there is no end
+        beyond[rows] = np.nan_to_num(np.maximum(over, 0.0))
+    return beyond
+
+
+def _unsure(unsure: FloatArray, time: FloatArray) -> Iterator[Reason]:
+    """Frames whose standard deviation is large."""
+    mask = unsure > UNSURE[0]
+    if not mask.any():
+        return
+    share, worse = float(mask.mean()), float(np.mean(unsure > UNSURE[1]))
+    level = "bad" if worse >= UNSURE_SHARE[1] else level_of(share, UNSURE_SHARE[0], np.inf)
+    text = f"a standard deviation of {unsure[mask].mean():.0%} of the range {found_in(mask, time)}"
+    cure = "facert suggest TAKE --have MODEL names frames to pose"
+    yield Reason("unsure", level, text, cure, np.flatnonzero(mask))
+
+
+def _jumps(result: Take, ranges: FloatArray) -> Iterator[Reason]:
+    """Frames whose pose leaves those before and after."""
+    assert result.params is not None
+    mask = jumps(result.params, result.time, ranges)
+    frames = np.flatnonzero(mask)
+    if not len(frames):
+        return
+    minutes = max((result.time[-1] - result.time[0]) / 60.0, 1.0 / 6.0)
+    level = level_of(len(frames) / minutes, *JUMPS)
+    text = f"{plural(len(frames), 'jump')}: {found_in(mask, result.time)}"
+    cure = "look at the source there: facert clean TAKE, or blank the rows"
+    yield Reason("jumps", level, text, cure, frames)
+
+
+def jumps(params: FloatArray, time: FloatArray, ranges: FloatArray) -> BoolArray:
+    """Frames whose pose (T, P) is far off the middle of its neighbours', (T,)."""
+    mask = np.zeros(len(params), dtype=np.bool_)
+    if len(params) > 2:
+        off = params[1:-1] - (params[:-2] + params[2:]) / 2.0
+        steps = np.diff(time)
+        together = np.maximum(steps[1:], steps[:-1]) < PAUSE * np.median(steps)
+        mask[1:-1] = together & (relative_to(ranges, off) > JUMP)
+    return mask
+
+
+def _idle(result: Take, model: TrainedModel, ranges: FloatArray) -> Iterator[Reason]:
+    """A note on controls that never move: in no posed frame, or not in this take."""
+    assert result.params is not None
+    names = np.array(model.controls.names)
+    never = names[ranges == 0.0]
+    none = np.empty(0, dtype=np.int64)
+    if len(never) and len(never) < len(names):
+        text = f"no pose moves {listed(never.tolist(), 3)}: at rest throughout"
+        yield Reason("idle controls", "good", text, "pose frames that use them", none)
+    still = names[(ranges > 0.0) & (np.ptp(result.params, axis=0) <= STILL * ranges)]
+    if len(still):
+        text = f"{listed(still.tolist(), 3)} hardly move in this take"
+        yield Reason("idle controls", "good", text, "none, if the actor does not either", none)
