@@ -55,7 +55,7 @@ def labelled(take: Take, poses: Poses) -> Take:
         if take.params is not None and len(take.labels):
             params[:] = take.params
         params[frames] = poses.values[:, order]
-        return replace(take, controls=controls, params=params, std=None)
+        return replace(take, controls=controls, params=params, std=None, corrections=None)
 
 
 def _known(poses: Poses) -> Poses:
@@ -191,7 +191,9 @@ def weights_as_poses(take: Take, rig: Rig) -> Take:
         raise InputError("/source/weights", "a whole frame", found, "Fill them: facert clean.")
     controls = Controls(tuple(poses.names[i] for i in kept))
     params = np.where(whole[:, None], values, np.nan)
-    return replace(take, controls=controls, params=params, std=None, animation=None)
+    return replace(
+        take, controls=controls, params=params, std=None, animation=None, corrections=None
+    )
 
 
 def predicted_poses(take: Take) -> int:

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.corrections import at_frames, put_in, taken_out
 from facert.data.rate import AGREES, frames_at, frames_shown, rate_shown, standard_rate
 from facert.data.take import Source, Take
 from facert.data.text import listed, plural
@@ -51,9 +52,7 @@ def resampled(take: Take, fps: float) -> Take:
     start = recounted(take.start_timecode, take.fps, fps)
     agrees = abs(take.fps - fps) <= AGREES * fps
     places = frames_at(take.time, fps, _SAME * fps) if agrees else None
-    if places is None:
-        return replace(_interpolated(take, fps), start_timecode=start)
-    return replace(_placed(take, places, fps), start_timecode=start)
+    return replace(_remade(take, places, fps), start_timecode=start)
 
 
 def evenly_spaced(take: Take) -> Take:
@@ -67,11 +66,10 @@ def evenly_spaced(take: Take) -> Take:
     """
     _check_pauses(take.time)
     places = frames_at(take.time, take.fps, EVEN)
+    even = _remade(take, places, take.fps)
     if places is None:
-        even = _interpolated(take, take.fps)
         log.info("frames lie unevenly: resampled to %d at %.6g a second", len(even), take.fps)
-        return even
-    return _placed(take, places, take.fps)
+    return even
 
 
 def held(take: Take) -> Take:
@@ -122,6 +120,19 @@ def counted_at(take: Take, fps: float) -> Take:
     log.info("the file's times show %.6g frames/s: counted at %.6g", shown, fps)
     time = (take.time[0] * shown + frames) / fps
     return replace(take, time=time, fps=fps, start_timecode=start, clock_start=0.0)
+
+
+def _remade(take: Take, places: IntArray | None, fps: float) -> Take:
+    """The take with its frames at these places of an even grid, else interpolated.
+
+    Corrections go to the nearest new frames, and are blended anew with what was predicted.
+    """
+    bare = taken_out(take)
+    made = _interpolated(bare, fps) if places is None else _placed(bare, places, fps)
+    if take.corrections is None:
+        return made
+    frames = nearest_frames(made.time, take.time[take.corrections.frames])
+    return put_in(made, at_frames(take.corrections, frames))
 
 
 def _placed(take: Take, places: IntArray, fps: float) -> Take:

@@ -87,7 +87,14 @@ def _cut(take: Take, columns: list[int], names: tuple[str, ...]) -> Take:
     assert take.params is not None
     std = None if take.std is None else take.std[:, columns]
     params = take.params[:, columns]
-    return replace(take, controls=Controls(names), params=params, std=std, animation=None)
+    return replace(
+        take,
+        controls=Controls(names),
+        params=params,
+        std=std,
+        animation=None,
+        corrections=None,
+    )
 
 
 def _others(names: tuple[str, ...], shared: list[int]) -> tuple[str, ...]:

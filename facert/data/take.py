@@ -6,7 +6,7 @@ the field by its path in the HDF5 layout. Arrays are float64 and read-only: a ta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from facert.data.arrays import (
     checked_names,
     float_array,
     frozen,
+    require_finite,
     require_plain,
     require_shape,
     require_time,
@@ -124,6 +125,66 @@ class Controls:
 
 
 @dataclass(frozen=True, eq=False)
+class Corrections:
+    """Poses that somebody set in a result of retargeting, and what the result was without them.
+
+    Parameters
+    ----------
+    frames : array of int, shape (c,)
+        The corrected frames, rising.
+    params : array, shape (c, P)
+        Their poses.
+    width : array, shape (c,), or one number
+        Seconds that the window of each is wide over which its correction fades, half before it and
+        half after it.
+    predicted, std : array, shape (T, P), optional
+        Poses of the result without corrections, and their standard deviations where there are any;
+        `facert.data.corrections` fills them in.
+
+    Raises
+    ------
+    InputError
+        When shapes disagree, frames do not rise, or a number is not finite.
+    """
+
+    frames: IntArray
+    params: FloatArray
+    width: FloatArray
+    predicted: FloatArray | None = None
+    std: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        frames = np.array(self.frames)
+        path, fix = "/corrections/frames", "Number each corrected frame from 0."
+        if frames.ndim != 1 or not frames.size or frames.dtype.kind not in "iu":
+            found = f"{frames.dtype} {frames.shape}"
+            raise InputError(path, "a number a corrected frame", found, fix)
+        if (np.diff(frames) <= 0).any() or frames[0] < 0:
+            raise InputError(path, "rising numbers from 0", "others", fix)
+        count = len(frames)
+        params = float_array(self.params, "/corrections/params")
+        layout, fix = (count, "P"), "Give a whole pose a corrected frame."
+        require_shape(params.shape, layout, "/corrections/params", fix)
+        require_finite(params, "/corrections/params")
+        width = float_array(self.width, "/corrections/width")
+        width = np.full(count, width) if width.ndim == 0 else width
+        require_shape(width.shape, (count,), "/corrections/width", "Give each correction a width.")
+        if not (np.isfinite(width) & (width >= 0.0)).all():
+            fix = "Give each correction a width."
+            raise InputError("/corrections/width", "seconds from 0", "others", fix)
+        set_fields(self, frames=frozen(frames.astype(np.int64)), params=frozen(params))
+        set_fields(self, width=frozen(width))
+
+    def require_fit(self, shape: tuple[int, ...]) -> None:
+        """Check that these are corrections of a take with poses of this shape, (T, P)."""
+        fix = "Correct the result that these corrections are of."
+        if self.frames[-1] >= shape[0]:
+            expected, found = f"frames up to {shape[0] - 1}", f"{self.frames[-1]}"
+            raise InputError("/corrections/frames", expected, found, fix)
+        require_shape(self.params.shape[1:], shape[1:], "/corrections/params", fix)
+
+
+@dataclass(frozen=True, eq=False)
 class Take:
     """A recorded performance, with the poses of the character that are known.
 
@@ -138,7 +199,8 @@ class Take:
     params : array, shape (T, P), optional
         Poses in the control's own units; a row of NaN means that the frame has no pose.
     std : array, shape (T, P), optional
-        Predictive standard deviation of ``params``, when a method wrote them.
+        Predictive standard deviation of ``params``, when a method wrote them. A pose without one,
+        a row of NaN, is somebody's.
     animation : array, shape (n, P), optional
         Poses of the character without a source frame.
     fps : float
@@ -149,6 +211,8 @@ class Take:
         As recorded; empty when unknown.
     clock_start : float
         Seconds on the recorder's clock that are 0 in `time`; 0 where `time` is that clock.
+    corrections : Corrections, optional
+        Which poses of a result somebody corrected; ``params`` hold them.
 
     Raises
     ------
@@ -168,6 +232,7 @@ class Take:
     up_axis: str = ""
     created_by: str = field(default="")
     clock_start: float = 0.0
+    corrections: Corrections | None = None
 
     def __post_init__(self) -> None:
         time = float_array(self.time, "/time")
@@ -179,15 +244,27 @@ class Take:
             expected, found = "seconds on the recorder's clock", f"{self.clock_start}"
             raise InputError("attribute clock_start", expected, found, "Correct or remove it.")
         set_fields(self, time=frozen(time))
-        for name, rows in (("params", frames), ("std", frames), ("animation", None)):
-            set_fields(self, **{name: self._poses(name, rows)})
+        for name in ("params", "std"):
+            path = f"/target/{name}"
+            set_fields(self, **{name: self._poses(getattr(self, name), path, frames)})
+        animation = self._poses(self.animation, "/animation/params", None)
+        set_fields(self, animation=animation, corrections=self._checked_corrections())
 
-    def _poses(self, name: str, rows: int | None) -> FloatArray | None:
+    def _checked_corrections(self) -> Corrections | None:
+        """The corrections, with what was predicted checked as the poses are."""
+        found = self.corrections
+        if found is None:
+            return None
+        found.require_fit((0, 0) if self.params is None else self.params.shape)
+        predicted = self._poses(found.predicted, "/corrections/predicted", len(self))
+        return replace(
+            found, predicted=predicted, std=self._poses(found.std, "/corrections/std", len(self))
+        )
+
+    def _poses(self, value: FloatArray | None, path: str, rows: int | None) -> FloatArray | None:
         """Check one of the pose matrices and return it as float64."""
-        value = getattr(self, name)
         if value is None:
             return None
-        path = "/animation/params" if name == "animation" else f"/target/{name}"
         if self.controls is None:
             fix = "Write /target/names (P,)."
             raise InputError("/target/names", "the controls' names", "none", fix)
@@ -196,7 +273,7 @@ class Take:
         require_shape(poses.shape, expected, path, "Give a row a frame and a column a control.")
         known = ~np.isnan(poses)
         partial = np.flatnonzero(known.any(axis=1) & ~known.all(axis=1))
-        if np.isinf(poses).any() or len(partial) or (name == "animation" and not known.all()):
+        if np.isinf(poses).any() or len(partial) or (rows is None and not known.all()):
             row = f"row {partial[0]} known in part" if len(partial) else "infinite or NaN values"
             whole = "whole finite poses (a row of NaN where a frame has none)"
             raise InputError(path, whole, row, "Pose every control of the frame, or none.")

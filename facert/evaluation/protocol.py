@@ -233,7 +233,9 @@ def _capped(problem: Problem, candidates: IntArray, repeat: int) -> IntArray:
 def _frames_of(take: Take, rows: IntArray, source: FloatArray, **poses: Any) -> Take:
     """Some frames of a take, with this source (n, D) and these poses."""
     source_of = take.source.with_matrix(source)
-    return replace(take, time=take.time[rows], source=source_of, std=None, **poses)
+    return replace(
+        take, time=take.time[rows], source=source_of, std=None, corrections=None, **poses
+    )
 
 
 def _noisy(problem: Problem, take: Take, repeat: int) -> FloatArray:

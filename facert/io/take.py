@@ -13,12 +13,20 @@
 ``/target/limits``  (P, 2)                 optional
 ``/target/std``     (T, P)                 optional: predictive standard deviation of the params
 ``/animation/params`` (n, P)               optional: poses without a source frame
+``/corrections/``                          optional: which poses of a result somebody corrected
+``  frames``          (c,) int             the frames; ``/target/params`` has their poses
+``  width``           (c,)                 seconds from the beginning of their windows to the end
+``  predicted``       (T, P)               the poses without corrections
+``  std``             (T, P)               optional: their standard deviation
 attributes                                 format, format_version, fps, units, created_by,
                                            optional start_timecode, up_axis, clock_start
 ==================  =====================  =========================================================
 
 ``/source/std``, ``/source/filled`` and ``/source/head`` are written beside a take for who looks for
 them; reading passes over these and over anything else that it does not know.
+
+A file with corrections has format version 2, any other 1: who does not know of corrections would
+take predicted poses for somebody's.
 """
 
 from __future__ import annotations
@@ -32,8 +40,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import require_shape
-from facert.data.take import Controls, Source, Take
+from facert.data.arrays import FloatArray, require_shape
+from facert.data.take import Controls, Corrections, Source, Take
 from facert.errors import InputError
 from facert.io.guarded import parsing
 from facert.io.hdf5 import (
@@ -45,7 +53,8 @@ from facert.io.hdf5 import (
     stated_format,
 )
 
-VERSION = 1
+VERSION = 2
+_WITHOUT_CORRECTIONS = 1
 _LOOKED_AT = 2**18  # numbers of poses that show what a take is
 
 
@@ -56,11 +65,12 @@ def read_take(path: Path) -> Take:
     """
     with open_guarded(path) as file:
         file.require_format(TAKE_FORMAT, VERSION)
+        params = file.optional("/target/params")
         return Take(
             time=file.numbers("/time"),
             source=_read_source(file),
             controls=_read_controls(file),
-            params=file.optional("/target/params"),
+            params=params,
             std=file.optional("/target/std"),
             animation=file.optional("/animation/params"),
             fps=file.number_attribute("fps"),
@@ -69,6 +79,7 @@ def read_take(path: Path) -> Take:
             up_axis=file.text_attribute("up_axis"),
             created_by=file.text_attribute("created_by"),
             clock_start=file.number_attribute("clock_start", 0.0),
+            corrections=None if params is None else _read_corrections(file, params),
         )
 
 
@@ -120,7 +131,8 @@ def write_take(
 
     Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
-    with create(path, TAKE_FORMAT, VERSION, overwrite) as file:
+    version = _WITHOUT_CORRECTIONS if take.corrections is None else VERSION
+    with create(path, TAKE_FORMAT, version, overwrite) as file:
         file.attribute("fps", take.fps)
         file.attribute("units", take.units)
         file.attribute("start_timecode", take.start_timecode)
@@ -129,6 +141,7 @@ def write_take(
         file.array("/time", take.time)
         _write_source(file, take.source)
         _write_target(file, take)
+        _write_corrections(file, take.corrections)
         for where, values in beside.items():
             file.array(where, values)
 
@@ -153,6 +166,26 @@ def _read_controls(file: GuardedFile) -> Controls | None:
     if "/target/names" not in file:
         return None
     return Controls(file.names("/target/names"), file.optional("/target/limits"))
+
+
+def _read_corrections(file: GuardedFile, params: FloatArray) -> Corrections | None:
+    """The corrections among poses (T, P)."""
+    if "/corrections/frames" not in file:
+        return None
+    frames = file.integers("/corrections/frames")
+    width, predicted = (file.numbers(f"/corrections/{name}") for name in ("width", "predicted"))
+    inside = (frames >= 0) & (frames < len(params))
+    if params.ndim != 2 or not inside.all():
+        expected, fix = f"frames of the take, 0 to {len(params) - 1}", "Correct the result anew."
+        raise InputError("/corrections/frames", expected, "others", fix)
+    std = file.optional("/corrections/std")
+    return Corrections(frames, params[frames], width, predicted, std)
+
+
+def _write_corrections(file: NewFile, corrections: Corrections | None) -> None:
+    if corrections is not None:
+        for name in ("frames", "width", "predicted", "std"):
+            file.array(f"/corrections/{name}", getattr(corrections, name))
 
 
 def _write_source(file: NewFile, source: Source) -> None:

@@ -196,4 +196,11 @@ def _labels_only(take: Take, controls: Controls) -> Take:
     columns = match(controls.names, take.controls.names, "/target/names")
     params = None if take.params is None or take.std is not None else take.params[:, columns]
     animation = None if take.animation is None else take.animation[:, columns]
-    return replace(take, controls=controls, params=params, std=None, animation=animation)
+    return replace(
+        take,
+        controls=controls,
+        params=params,
+        std=None,
+        animation=animation,
+        corrections=None,
+    )

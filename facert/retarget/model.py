@@ -69,7 +69,7 @@ class TrainedModel:
         if set(take.controls.names) != set(self.controls.names):
             return take
         if self.labels > len(self.poses):  # not all of them were kept
-            return replace(take, params=None)
+            return replace(take, params=None, std=None, corrections=None)
         columns = [take.controls.names.index(name) for name in self.controls.names]
         seen = (take.params[:, None, columns] == self.poses[None]).all(axis=2).any(axis=1)
         return replace(take, params=np.where(seen[:, None], np.nan, take.params))

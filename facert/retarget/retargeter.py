@@ -157,7 +157,13 @@ class Retargeter(TrainedModel):
         self, take: Take, source: Source, params: FloatArray, std: FloatArray | None
     ) -> Take:
         return replace(
-            take, source=source, controls=self.controls, params=params, std=std, animation=None
+            take,
+            source=source,
+            controls=self.controls,
+            params=params,
+            std=std,
+            animation=None,
+            corrections=None,
         )
 
 

@@ -68,7 +68,7 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     bounds = pose_bounds(take, poses, how.limits)
     if bounds is not None:
         params = np.clip(params, *bounds.T)
-    return replace(take, params=params, std=None)
+    return replace(take, params=params, std=None, corrections=None)
 
 
 def propagate_positions(
@@ -120,6 +120,7 @@ def propagate_positions(
         params=None,
         std=None,
         animation=None,
+        corrections=None,
         units=target.units,
         up_axis=target.up_axis,
     )

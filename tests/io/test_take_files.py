@@ -128,7 +128,7 @@ def test_a_file_of_another_program_is_read(tmp_path):
     [
         ({"format": "facert-rig"}, "attribute format"),
         ({"format": None}, "attribute format"),
-        ({"format_version": 2}, "Update facert"),
+        ({"format_version": 3}, "Update facert"),
         ({"format_version": None}, "attribute format_version"),
         ({"fps": None}, "attribute fps"),
         ({"fps": -1.0}, "fps: expected a positive number"),

@@ -167,7 +167,13 @@ def _frame(take: Take, frame: int) -> Take:
     params = None if take.params is None else take.params[[frame]]
     std = None if take.std is None or frame not in take.labels else take.std[[frame]]
     return replace(
-        take, time=take.time[[frame]], source=source, params=params, std=std, animation=None
+        take,
+        time=take.time[[frame]],
+        source=source,
+        params=params,
+        std=std,
+        animation=None,
+        corrections=None,
     )
 
 

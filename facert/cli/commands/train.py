@@ -121,7 +121,11 @@ def command(
     continues = checkpoint is not None and checkpoint.continues
     overwrite_model = overwrite or continues
     require_replaceable(output, overwrite_model)
-    data = replace(_read(take, target), std=None) if predicted else _read(take, target)
+    data = (
+        replace(_read(take, target), std=None, corrections=None)
+        if predicted
+        else _read(take, target)
+    )
     _check_regions(regions, settings.regions, data)
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
