@@ -6,6 +6,7 @@ the field by its path in the HDF5 layout. Arrays are float64 and read-only: a ta
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -94,6 +95,12 @@ class Source:
         shape = (len(matrix), *self.values.shape[1:])
         spread = None if std is None else std.reshape(shape)
         return Source(matrix.reshape(shape), self.names, spread)
+
+    def followed_by(self, others: Sequence[Source]) -> Source:
+        """The frames of this source and, after them, those of others with the same names."""
+        if not others:
+            return self
+        return Source(np.concatenate([self.values, *(one.values for one in others)]), self.names)
 
 
 @dataclass(frozen=True, eq=False)

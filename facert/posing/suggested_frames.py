@@ -14,13 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.matching_takes import as_takes, without_predicted
 from facert.data.normalisation import Normalisation
+from facert.data.subject import about
 from facert.data.take import SourceKind, Take
+from facert.data.takes import Takes
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
 from facert.models.whitening import whitening
@@ -45,39 +49,70 @@ class Suggestion:
     frames : array of int, shape (n,)
         Frame numbers, the most useful first.
     shares : array, shape (n,)
-        Share of the take's frames that are nearest to each, posed frames counted as well.
+        Share of all frames that are nearest to each, posed frames counted as well.
+    takes : array of int, shape (n,)
+        The take of each, from 0.
     """
 
     frames: IntArray
     shares: FloatArray
+    takes: IntArray
+
+
+Have = Sequence[int] | Sequence[Sequence[int]] | IntArray | Sequence[IntArray] | Retargeter
 
 
 def suggest_frames(
-    take: Take, count: int, have: Sequence[int] | IntArray | Retargeter = (), seed: int = 0
+    take: Take | Sequence[Take] | Takes, count: int, have: Have = (), seed: int = 0
 ) -> Suggestion:
-    """The frames of a take that are most worth posing.
+    """The frames of a take, or of several, that are most worth posing.
 
     Poses are not looked at: the suggestion can come before the first one.
 
     Parameters
     ----------
-    take : Take
+    take : Take, or sequence of Take
     count : int
     have : sequence of int, or Retargeter
-        Frames that are posed already, e.g. ``take.labels``. Or a model: then the take's labels
-        are, and what the model learned from, and frames count as much as the model is uncertain
-        of them.
+        Frames that are posed already, e.g. ``take.labels``; of several takes a sequence for each.
+        Or a model: then the takes' labels are, and what the model learned from, and frames count
+        as much as the model is uncertain of them. Poses that a model predicted are no labels.
     seed : int
-        Which frames of a take with more than `MOST_FRAMES` are looked at.
+        Which frames are looked at, where there are more than `MOST_FRAMES`.
 
     Raises
     ------
     InputError
-        When the take has too few frames that show at least half of the source, or the model does
-        not fit it or predicts no standard deviation.
+        When too few frames show at least half of the source, the takes do not fit together, or
+        the model does not fit them or predicts no standard deviation.
     """
-    model = have if isinstance(have, Retargeter) else None
-    posed = _checked_frames(take.labels if isinstance(have, Retargeter) else have, len(take))
+    takes, model = as_takes(take), have if isinstance(have, Retargeter) else None
+    if isinstance(have, Retargeter):
+        posed = takes.indices([without_predicted(part).labels for part in takes.parts])
+    else:
+        posed = _frames_of(takes, have)
+    found = _suggested(takes, count, posed, model, seed)
+    places, frames = takes.located(found.frames)
+    return replace(found, frames=frames, takes=places)
+
+
+def _frames_of(takes: Takes, have: Sequence[Any] | IntArray) -> IntArray:
+    """Posed frames among those of all takes, checked."""
+    if len(takes.parts) == 1:
+        return _checked_frames(have, len(takes.parts[0]))
+    each = list(have) or [()] * len(takes.parts)
+    if len(each) != len(takes.parts) or any(np.ndim(frames) != 1 for frames in each):
+        expected = f"frames of each of {len(takes.parts)} takes"
+        raise InputError("have", expected, f"{len(each)}", "Give a list for each take.")
+    pairs = zip(each, takes.parts, strict=True)
+    return takes.indices([_checked_frames(frames, len(part)) for frames, part in pairs])
+
+
+def _suggested(
+    takes: Takes, count: int, posed: IntArray, model: Retargeter | None, seed: int
+) -> Suggestion:
+    """The suggestion by the numbers of frames among those of all takes."""
+    take = takes.joined
     usable = take.source.valid.mean(axis=1) >= MIN_OBSERVED
     candidates = np.setdiff1d(np.flatnonzero(usable), posed)
     candidates = np.sort(np.random.default_rng(seed).permutation(candidates)[:MOST_FRAMES])
@@ -93,12 +128,16 @@ def suggest_frames(
     learned = None if model is None else model.labelled
     problem = _medoid_problem(take, candidates, posed[usable[posed]], count, learned)
     if model is not None:
-        problem = problem.weighted(_uncertainty(model, take)[candidates])
-    chosen = _preferred(problem, problem.medoids(count), take, candidates)
+        problem = problem.weighted(_uncertainty(model, takes)[candidates])
+    hidden, speeds = (
+        (~take.source.valid).sum(axis=1),
+        np.concatenate(list(map(_speeds, takes.parts))),
+    )
+    chosen = _preferred(problem, problem.medoids(count), hidden[candidates], speeds[candidates])
     chosen = problem.ranked(chosen)
     near = np.column_stack([problem.distances[:, chosen], problem.covered]).argmin(axis=1)
     shares = np.bincount(near, minlength=count + 1)[:count] / len(candidates)
-    return Suggestion(candidates[chosen], shares)
+    return Suggestion(candidates[chosen], shares, np.zeros(count, dtype=np.int64))
 
 
 def _medoid_problem(
@@ -118,8 +157,16 @@ def _medoid_problem(
     return MedoidProblem(distances, covered, rivals)
 
 
-def _uncertainty(model: Retargeter, take: Take) -> FloatArray:
+def _uncertainty(model: Retargeter, takes: Takes) -> FloatArray:
     """Standard deviation of the model's poses, root mean square over controls, (T,); above 0."""
+    found = []
+    for part, name in takes.named:
+        with about(name):
+            found.append(_spread(model, part))
+    return np.concatenate(found)
+
+
+def _spread(model: Retargeter, take: Take) -> FloatArray:
     std = model.retarget(take).std
     if std is None:
         default, method = Settings().method, model.settings.method
@@ -167,11 +214,12 @@ def _near(time: FloatArray, other: FloatArray, apart: float) -> BoolArray:
 
 
 def _preferred(
-    problem: MedoidProblem, chosen: IntArray, take: Take, candidates: IntArray
+    problem: MedoidProblem, chosen: IntArray, hidden: IntArray, speeds: FloatArray
 ) -> IntArray:
-    """The chosen, each exchanged for one that shows more, or moves less, if that serves as well."""
-    hidden = (~take.source.valid).sum(axis=1)[candidates]
-    speeds = _speeds(take)[candidates]
+    """The chosen, each exchanged for one that shows more, or moves less, if that serves as well.
+
+    `hidden` (n,) and `speeds` (n,) are of all candidates.
+    """
     chosen = chosen.copy()
     for slot in range(len(chosen)):
         costs = problem.exchange_costs(chosen)[slot]

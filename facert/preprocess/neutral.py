@@ -9,11 +9,16 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import nearest
+from facert.data.ranges import parse_frames
 from facert.data.take import SourceKind
+from facert.data.takes import Takes
+from facert.data.text import plural
 from facert.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -76,6 +81,49 @@ def at_rest(X: FloatArray, frames: IntArray) -> FloatArray:
     seen = ~np.isnan(X[frames])
     total = np.where(seen, X[frames], 0.0).sum(axis=0)
     return np.where(seen.any(axis=0), total / np.maximum(seen.sum(axis=0), 1), np.nan)
+
+
+def rest_frames(text: str | None, takes: Takes) -> list[IntArray | None]:
+    """The frames of each take in which the actor rests; None for a take that names none.
+
+    Parameters
+    ----------
+    text : str or None
+        Frames as "12" or "0..20"; of several takes "0..20; 3" in their order, or with their files
+        as "a.h5:0..20; b.h5:3".
+    takes : Takes
+
+    Raises
+    ------
+    InputError
+        For what is no such text, an unknown file, or the rest of a take without that of the first.
+    """
+    found: list[IntArray | None] = [None] * len(takes.parts)
+    for place, part in enumerate((text or "").split(";") if text is not None else ()):
+        name, colon, frames = part.strip().rpartition(":")
+        if colon and name.rpartition("..")[2].isdecimal() and frames.isdecimal():
+            name, frames = "", part.strip()  # a range with a step
+        which = _named(name, takes) if name else place
+        if which >= len(found):
+            expected = plural(len(found), "take")
+            raise InputError("neutral", f"frames of {expected}", repr(text), "Leave some out.")
+        found[which] = np.array(parse_frames(frames, "neutral"), dtype=np.int64)
+    if found[0] is None and any(frames is not None for frames in found):
+        expected, fix = f"frames of {takes.names[0]} as well", "Others are calibrated to the first."
+        raise InputError("neutral", expected, repr(text), fix)
+    return found
+
+
+def _named(name: str, takes: Takes) -> int:
+    """The take of a file, by its whole name or the end of its path."""
+    whole = [place for place, one in enumerate(takes.names) if one == name]
+    ends = [place for place, one in enumerate(takes.names) if Path(one).name == Path(name).name]
+    found = whole or ends
+    if len(found) != 1:
+        near = nearest(name, takes.names)
+        fix = f"Did you mean {near!r}?" if near else "Write FILE:FRAMES, as in a.h5:0..20."
+        raise InputError("neutral", f"one of {', '.join(takes.names)}", repr(name), fix)
+    return found[0]
 
 
 def median_at_rest(X: FloatArray, scale: float) -> FloatArray:

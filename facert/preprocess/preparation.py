@@ -1,29 +1,39 @@
-"""Preparation of a recorded take for training: all that `train` learns from."""
+"""Preparation of recorded takes for training: all that `train` learns from.
+
+Each take is cleaned on its own, by its own noise, gaps and clock; what is learned is of all.
+"""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.matching_takes import as_takes
 from facert.data.normalisation import Normalisation
-from facert.data.ranges import parse_frames
+from facert.data.subject import about
 from facert.data.take import Controls, Source, Take
+from facert.data.takes import Takes, separated
 from facert.data.text import plural
 from facert.errors import InputError
 from facert.preprocess.faults import without_faults
 from facert.preprocess.known_poses import keep, pose_bounds
 from facert.preprocess.motion.estimate import LEAST_NOISE, MotionEstimate, estimate_if_it_moves
+from facert.preprocess.motion.pooled import PooledEstimate, pooled
 from facert.preprocess.motion.series import capture_noise, largest_step
-from facert.preprocess.neutral import at_rest, most_neutral
+from facert.preprocess.neutral import Calibration, at_rest, most_neutral, rest_frames
 from facert.preprocess.source_layout import SourceLayout
 from facert.preprocess.training_set import MIN_OBSERVED, TrainingSet, choose_training_set
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
 
+APART = 1.0
+"""Takes are far apart when most numbers are so many standard deviations of the largest motion."""
 LEFT = 0.3
 """This share of the noise is left in the frames that are learned from. It holds a method back from
 reading much into motion as small as the noise, which would not hold for expressions that no label
@@ -33,25 +43,27 @@ it; with this share, 5 % less and 1 % more."""
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A take to learn from."""
+    """Takes to learn from."""
 
     # Without what no frame shows, bad markers, noise and gaps, as far as the settings ask. Frames
     # that show too little to be learned from are as they were.
-    take: Take
+    takes: Takes
+    take: Take  # The frames of all of them, one after the other
     measured: Source  # The same with noise and gaps
+    step: float  # From one frame to the next, normalised units: σ_t, Eq. (14)
     units: Normalisation  # Of the measured source
     # Estimate of noise and motion; None where frames do not follow each other
-    estimate: MotionEstimate | None
+    estimate: MotionEstimate | PooledEstimate | None
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """Training data of a take, in the take's units, and the units to normalise it by."""
+    """Training data of takes, in their units, and the units to normalise it by."""
 
     prepared: Prepared
-    # Names of the markers or weights that the take was recorded with, seen or not
+    # Names of the markers or weights that the takes were recorded with, seen or not
     names: tuple[str, ...]
-    layout: SourceLayout  # Of the prepared take
+    layout: SourceLayout  # Of the prepared takes
     controls: Controls
     chosen: TrainingSet  # Frames and poses that a method is given
     poses: FloatArray  # (l + n, P): All these poses, those of the labelled frames first
@@ -63,74 +75,149 @@ class TrainingData:
     kept: FloatArray  # (k, P): Known poses that a model keeps
 
 
-def training_data(take: Take, settings: Settings) -> TrainingData:
-    """Clean a take, and draw from it what a method is to learn.
+def training_data(given: Take | Takes, settings: Settings) -> TrainingData:
+    """Clean takes, and draw from them what a method is to learn.
 
     Raises
     ------
     InputError
-        When the take has too few labels, or source or poses that never change.
+        When the takes have too few labels, or source or poses that never change.
     """
-    if take.controls is None:
+    takes = as_takes(given)
+    controls = takes.parts[0].controls
+    if controls is None:
         fix = (
             "Pose 10 to 40 frames: facert suggest names frames to pose, and "
             "facert convert ... --poses poses.csv brings the poses in."
         )
         raise InputError("/target", "poses in some frames", "none", fix)
-    prepared = prepare(take, settings)
+    prepared = prepare(takes, settings)
     clean = prepared.take
     chosen = choose_training_set(clean, settings)
     poses = np.vstack([chosen.Y_labelled, chosen.Y_unlabelled])
     return TrainingData(
         prepared=prepared,
-        names=take.source.names,
+        names=takes.parts[0].source.names,
         layout=SourceLayout(clean.source.kind, clean.source.names),
-        controls=take.controls,
+        controls=controls,
         chosen=chosen,
         poses=poses,
-        step=_step(prepared),
+        step=prepared.step,
         complete=_complete_frames(clean.source, chosen),
-        neutral=_neutral(clean, chosen, settings),
+        neutral=_neutral(prepared.takes, chosen, settings),
         bounds=pose_bounds(clean, chosen.Y_labelled, settings.limits),
         target_units=Normalisation.of(poses, "/target/params"),
         kept=keep(chosen.Y_labelled, clean.animation, settings.seed),
     )
 
 
-def prepare(take: Take, settings: Settings) -> Prepared:
-    """Take bad markers, noise and gaps out of a take, and what no frame shows.
+def prepare(given: Take | Takes, settings: Settings) -> Prepared:
+    """Take bad markers, noise and gaps out of takes, and what no frame shows.
 
     Raises
     ------
     InputError
         When nothing moves.
     """
+    takes = as_takes(given)
+    observed = _calibrated(_each(takes, partial(_without_faults, settings=settings)), settings)
+    observed = _observed_part(observed)
+    sources = [part.source for part in observed.parts]
+    matrices = [source.matrix for source in sources]
+    units = Normalisation.of(np.concatenate(matrices), f"/source/{sources[0].kind}")
+    _warn_of_distance(observed, units)
+    cleaned = [_cleaned(part, name, settings) for part, name in observed.named]
+    clean = observed.with_parts([part for part, _ in cleaned])
+    moving = [place for place, (_, found) in enumerate(cleaned) if found is not None]
+    found = [one for _, one in cleaned if one is not None]
+    estimate: MotionEstimate | PooledEstimate | None = found[0] if found else None
+    if len(cleaned) > 1 and found:
+        times = [observed.parts[place].time for place in moving]
+        estimate = pooled(found, [matrices[place] for place in moving], times, units)
+    measured = sources[0].followed_by(sources[1:])
+    step = _step(matrices) if estimate is None else estimate.sigma_t
+    step = max(step / units.scale, LEAST_NOISE)
+    return Prepared(clean, clean.joined, measured, step, units, estimate)
+
+
+def _each(takes: Takes, work: Callable[[Take], Take]) -> Takes:
+    """Work done with each take, named in the log and in errors where there are several."""
+    parts = []
+    for part, name in takes.named:
+        with about(name):
+            parts.append(work(part))
+    return takes.with_parts(parts)
+
+
+def _without_faults(take: Take, settings: Settings) -> Take:
     if settings.detect:
-        take = without_faults(take)
-    else:
-        _warn_of_zeros(take.source)
-    source = _observed_part(take.source)
-    units = Normalisation.of(source.matrix, f"/source/{source.kind}")
-    found = estimate_if_it_moves(source.matrix, take.time) if settings.smooth else None
-    if found is None:
-        return Prepared(replace(take, source=source), source, units, None)
-    log.info("%s", found.summary(take.units))
+        return without_faults(take)
+    _warn_of_zeros(take.source)
+    return take
+
+
+def _cleaned(take: Take, name: str, settings: Settings) -> tuple[Take, MotionEstimate | None]:
+    """A take without noise and gaps, as far as the settings ask, and its estimate."""
+    source = take.source
+    with about(name):
+        found = estimate_if_it_moves(source.matrix, take.time) if settings.smooth else None
+        if found is None:
+            return take, None
+        log.info("%s", found.summary(take.units))
     measured, clean = source.matrix, found.frames
     left = np.where(np.isnan(measured), clean, clean + LEFT * (measured - clean))
     shown = source.valid.mean(axis=1) >= MIN_OBSERVED
     frames = np.where(shown[:, None], left, measured)
-    return Prepared(replace(take, source=source.with_matrix(frames)), source, units, found)
+    return replace(take, source=source.with_matrix(frames)), found
 
 
-def _observed_part(source: Source) -> Source:
-    """The source without markers or weights that no frame shows: nothing can be learned of them."""
-    seen = np.asarray(source.valid.any(axis=0))
+def _calibrated(takes: Takes, settings: Settings) -> Takes:
+    """Takes moved to the first by the actor at rest, where both name it."""
+    rests = rest_frames(settings.neutral, takes)
+    if len(takes.parts) == 1 or rests[0] is None:
+        return takes
+    first, *_ = takes.parts
+    learned = at_rest(first.source.matrix, rests[0])
+    parts = [first]
+    for (part, name), frames in zip(takes.named[1:], rests[1:], strict=True):
+        if frames is None:
+            text = "%s: taken to be recorded as %s was, as no --neutral is given for it"
+            log.info(text, name, takes.names[0])
+            parts.append(part)
+            continue
+        with about(name):
+            own = at_rest(part.source.matrix, frames)
+        moved = Calibration.of(own, learned, part.source.kind).apply(part.source.matrix)
+        parts.append(replace(part, source=part.source.with_matrix(moved)))
+    return takes.with_parts(parts)
+
+
+def _observed_part(takes: Takes) -> Takes:
+    """Takes without markers or weights that no frame shows: nothing can be learned of them."""
+    first = takes.parts[0].source
+    seen = np.any([part.source.valid.any(axis=0) for part in takes.parts], axis=0)
     if seen.all():
-        return source
-    silent = [name for name, there in zip(source.names, seen, strict=True) if not there]
+        return takes
+    silent = [name for name, there in zip(first.names, seen, strict=True) if not there]
     log.warning("never observed in the take, left out: %s", ", ".join(silent))
-    names = tuple(name for name, there in zip(source.names, seen, strict=True) if there)
-    return Source(source.values[:, seen], names)
+    names = tuple(name for name, there in zip(first.names, seen, strict=True) if there)
+    return takes.with_parts(
+        [replace(one, source=Source(one.source.values[:, seen], names)) for one in takes.parts]
+    )
+
+
+def _warn_of_distance(takes: Takes, units: Normalisation) -> None:
+    """Warn of takes that lie far from the first: by their unit, or as the head stands elsewhere."""
+    first = np.nanmedian(units.apply(takes.parts[0].source.matrix), axis=0)
+    for part, name in takes.named[1:]:
+        centre = np.nanmedian(units.apply(part.source.matrix), axis=0)
+        away = float(np.nanmedian(np.abs(centre - first)))
+        if away > APART:
+            log.warning(
+                "%s lies far from %s, most of it %.2g times as far as the face moves: another "
+                "unit, or head motion that facert stabilise takes out?",
+                *(name, takes.names[0], away),
+            )
 
 
 def _warn_of_zeros(source: Source) -> None:
@@ -143,14 +230,10 @@ def _warn_of_zeros(source: Source) -> None:
         log.warning("%s exactly at (0, 0, 0): lost ones should be NaN", positions)
 
 
-def _step(prepared: Prepared) -> float:
-    """The distance from one frame to the next, normalised units."""
-    if prepared.estimate is None:
-        X = prepared.measured.matrix
-        step = largest_step(X, capture_noise(X))
-    else:
-        step = prepared.estimate.sigma_t
-    return max(step / prepared.units.scale, LEAST_NOISE)
+def _step(takes: Sequence[FloatArray]) -> float:
+    """The distance from one frame to the next in takes whose frames hardly follow each other."""
+    X = separated(takes)
+    return largest_step(X, capture_noise(X))
 
 
 def _complete_frames(source: Source, chosen: TrainingSet) -> FloatArray:
@@ -160,12 +243,12 @@ def _complete_frames(source: Source, chosen: TrainingSet) -> FloatArray:
     return complete if len(complete) > len(filled) else filled
 
 
-def _neutral(take: Take, chosen: TrainingSet, settings: Settings) -> FloatArray:
+def _neutral(takes: Takes, chosen: TrainingSet, settings: Settings) -> FloatArray:
     """The source with the actor at rest, (d_x,): in frames that are named, or the smallest pose."""
-    if settings.neutral is None:
+    frames = rest_frames(settings.neutral, takes)[0]
+    if frames is None:
         return np.asarray(chosen.X_labelled[most_neutral(chosen.Y_labelled)])
-    frames = np.array(parse_frames(settings.neutral, "neutral"), dtype=np.int64)
-    rest = at_rest(take.source.matrix, frames)
+    rest = at_rest(takes.parts[0].source.matrix, frames)
     if np.isnan(rest).any():
         raise InputError("neutral", "frames that show the face", "hidden markers", "Name others.")
     return rest

@@ -1,8 +1,9 @@
-"""Training of a retargeter on a take."""
+"""Training of a retargeter on takes."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +12,11 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.columns import warn_of_clocks
 from facert.data.labelling import predicted_poses
+from facert.data.matching_takes import as_takes, without_predicted
 from facert.data.normalisation import Normalisation
+from facert.data.subject import about
 from facert.data.take import Take
+from facert.data.takes import Takes
 from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
@@ -20,6 +24,7 @@ from facert.models.optim.monitor import Monitor
 from facert.preprocess.faults.absurd import NATURAL
 from facert.preprocess.faults.quantiles import quantile
 from facert.preprocess.motion.estimate import MotionEstimate
+from facert.preprocess.motion.pooled import PooledEstimate
 from facert.preprocess.preparation import TrainingData, training_data
 from facert.regions.learning import Learned, StartingModel, learn
 from facert.retarget.retargeter import Retargeter
@@ -34,17 +39,19 @@ SHARE, PERCENT = NATURAL
 
 
 def train(
-    take: Take,
+    take: Take | Sequence[Take] | Takes,
     settings: Settings | None = None,
     monitor: Monitor | None = None,
     start: Retargeter | None = None,
+    animation: Take | Sequence[Take] = (),
 ) -> Retargeter:
-    """Learn to retarget from a take's labels, its other frames, and its animation.
+    """Learn to retarget from the labels of takes, their other frames, and animation.
 
     Parameters
     ----------
-    take : Take
-        With poses in some frames.
+    take : Take, or sequence of Take
+        With poses in some frames; of several takes of one actor, in some of them. Units, names and
+        the order of controls are matched to the first.
     settings : Settings, optional
         By default those of the start, else a blend of experts, see `facert.methods.blend`.
     monitor : Monitor, optional
@@ -53,40 +60,77 @@ def train(
         What a shared model begins at, as after a label was added to the take that it was trained
         on: frames and poses that it knows keep their latent coordinates, and a few iterations
         do. One of another form is not used, with a warning; other methods learn in one go anyway.
+    animation : Take, or sequence of Take, optional
+        Old animation of the character, as poses without a frame: poses of a take, or its weights.
 
     Raises
     ------
     InputError
-        When the take has too few labels, or source or poses that never change.
+        When the takes have too few labels, source or poses that never change, or do not fit
+        together.
     """
+    takes = _posed_by_somebody(as_takes(take, animation))
     if settings is None:
         settings = Settings() if start is None else replace(start.settings, labels=None)
     if settings.unlabelled is None:
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
     require_known(settings)
-    check_poses(take)
-    _warn_of_absurd_poses(take)
-    warn_of_clocks(take)
-    data = training_data(take, settings)
+    _warn_of_absurd_poses(takes)
+    for part, name in takes.named:
+        with about(name):
+            warn_of_clocks(part)
+    data = training_data(takes, settings)
     begin_at = None if start is None else _start(start, data)
     learned = learn(data, settings, monitor or Monitor(), begin_at)
     prepared, chosen = data.prepared, data.chosen
+    units = takes.parts[0].units
     return Retargeter(
         method=learned.method,
         layout=data.layout,
-        units=take.units,
+        units=units,
         controls=data.controls,
         bounds=data.bounds,
         source_units=prepared.units,
         target_units=data.target_units,
-        figures=_noise_figures(prepared.estimate, take.units)
-        | _figures(learned, len(chosen.X_labelled), data.target_units),
+        figures=_noise_figures(prepared.estimate, units)
+        | _figures(learned, len(chosen.X_labelled), data.target_units)
+        | _of_takes(prepared.takes),
         neutral=data.neutral,
         motion=None if prepared.estimate is None else prepared.estimate.motion,
         labels=len(chosen.X_labelled),
         labelled=chosen.X_labelled,
         poses=data.kept,
     )
+
+
+def _posed_by_somebody(takes: Takes) -> Takes:
+    """The takes without the poses that a model predicted; refused where no others are there."""
+    if len(takes.parts) == 1:
+        check_poses(takes.parts[0])
+    else:
+        _warn_of_results(takes)
+    return takes.with_parts([without_predicted(part) for part in takes.parts])
+
+
+def _warn_of_results(takes: Takes) -> None:
+    """Warn of takes with predicted poses, each by its file; refuse where all are predicted."""
+    counts = [predicted_poses(part) for part in takes.parts]
+    if sum(counts) and sum(counts) == takes.labels:
+        raise _all_predicted(sum(counts))
+    for (part, name), count in zip(takes.named, counts, strict=True):
+        if count:
+            log.warning(
+                "%s: %s with a standard deviation: predicted, and not learned from; of %s it is",
+                *(name, plural(count, "pose"), plural(len(part.labels) - count, "other")),
+            )
+
+
+def _of_takes(takes: Takes) -> dict[str, Any]:
+    """The takes that a model learned from and their labels, where there are several."""
+    if len(takes.parts) == 1:
+        return {}
+    each = (f"{name} ({plural(len(part.labels), 'pose')})" for part, name in takes.named)
+    return {"takes": ", ".join(each)}
 
 
 def check_poses(take: Take) -> None:
@@ -96,24 +140,31 @@ def check_poses(take: Take) -> None:
     ------
     InputError
         When all of them are predicted: a result of retargeting was taken for what it was learned
-        from. Of some the log warns.
+        from. Where some are, as in a result that was corrected, the log names how many.
     """
     predicted = predicted_poses(take)
     if predicted and predicted == len(take.labels):
-        raise InputError(
-            "/target/std",
-            "poses that somebody set",
-            f"a standard deviation for all {predicted}: a model predicted them",
-            "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
-            "learns from these nonetheless.",
-        )
+        raise _all_predicted(predicted)
     if predicted:
-        poses = plural(predicted, "pose")
-        log.warning("%s with a standard deviation: predicted, and learned from as labels", poses)
+        log.warning(
+            "%s with a standard deviation: predicted, and not learned from, but the other %d are",
+            *(plural(predicted, "pose"), len(take.labels) - predicted),
+        )
 
 
-def _warn_of_absurd_poses(take: Take) -> None:
+def _all_predicted(count: int) -> InputError:
+    return InputError(
+        "/target/std",
+        "poses that somebody set",
+        f"a standard deviation for all {count}: a model predicted them",
+        "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
+        "learns from these nonetheless.",
+    )
+
+
+def _warn_of_absurd_poses(takes: Takes) -> None:
     """Warn of values among the labels that are far beyond all that is like them."""
+    take = takes.joined
     if take.params is None or take.controls is None or not len(take.labels):
         return
     sizes = np.abs(take.params[take.labels])
@@ -122,9 +173,9 @@ def _warn_of_absurd_poses(take: Take) -> None:
         reach = np.maximum(reach, np.abs(take.animation).max(axis=0))
     for row, control in np.argwhere(sizes > reach)[:NAMED].tolist():
         log.warning(
-            "the pose of frame %d has %s at %.3g, many times as much as other poses and controls:"
+            "the pose of frame %s has %s at %.3g, many times as much as other poses and controls:"
             " correct it if it is a slip",
-            take.labels[row],
+            takes.frame_name(int(take.labels[row])),
             take.controls.names[control],
             take.params[take.labels[row], control],
         )
@@ -163,7 +214,7 @@ def _start(start: Retargeter, data: TrainingData) -> StartingModel:
     return StartingModel(start.method, start.source_units, start.target_units, difference)
 
 
-def _noise_figures(found: MotionEstimate | None, unit: str) -> dict[str, Any]:
+def _noise_figures(found: MotionEstimate | PooledEstimate | None, unit: str) -> dict[str, Any]:
     """Noise and motion in the take's units."""
     if found is None:
         return {}

@@ -6,6 +6,7 @@ import logging
 
 from rich.console import Console
 
+from facert.data.subject import subject
 from facert.errors import escaped
 
 # Rich honours NO_COLOR and drops styles when the stream is not a terminal.
@@ -21,6 +22,7 @@ class _StderrHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         warning = record.levelno >= logging.WARNING
         prefix = "warning: " if warning else ""
+        prefix += f"{escaped(subject())}: " if subject() else ""
         lines = map(escaped, self.format(record).split("\n"))  # names in it may be foreign
         err.print(prefix + "\n".join(lines), style="yellow" if warning else None, markup=False)
 

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, frozen
+from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
 from facert.data.normalisation import STILL, Normalisation
 from facert.models.threads import threads_for
 from facert.preprocess.cache import keep_last
@@ -91,9 +91,7 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Mot
     InputError
         When nothing moves.
     """
-    places, step = even_grid(time)
-    even = np.full((places[-1] + 1, X.shape[1]), np.nan)
-    even[places] = X
+    even, places, step = evenly(X, time)
     sigma = capture_noise(even) if sigma is None else sigma
     ever = ~np.isnan(X).all(axis=0)
     units = Normalisation.of(X[:, ever], "/source")
@@ -107,6 +105,14 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Mot
     spread[:, ever] = units.scale * np.sqrt(variance[places])
     step = largest_step(frames)
     return MotionEstimate(frames, spread, np.isnan(X), sigma, step, motion, units, given)
+
+
+def evenly(X: FloatArray, time: FloatArray) -> tuple[FloatArray, IntArray, float]:
+    """Frames (T, d) on an even grid, NaN where it has none; their rows in it; its step, seconds."""
+    places, step = even_grid(time)
+    even = np.full((places[-1] + 1, X.shape[1]), np.nan)
+    even[places] = X
+    return even, places, step
 
 
 def estimate_if_it_moves(

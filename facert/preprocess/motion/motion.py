@@ -7,8 +7,9 @@ between two sights of a marker.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -83,13 +84,26 @@ class Motion(ArrayGroup):
         seconds : float
             From frame to frame.
         """
+        return cls.learned_over([X], sigma, [seconds])
+
+    @classmethod
+    def learned_over(
+        cls, takes: Sequence[FloatArray], sigma: float, seconds: Sequence[float]
+    ) -> Motion:
+        """The motion of several takes, each with its own seconds from frame to frame.
+
+        No stretch that it is learned from crosses from one take to the next. The rates are for the
+        frames of the first take.
+        """
+        X = np.concatenate(takes)
         seen = ~np.isnan(X)
         some = _spread(np.flatnonzero(seen.any(axis=1)), FIT)
         some = some if seen[some].any(axis=0).all() else np.arange(len(X))
-        filled = interpolated(X, np.arange(len(X), dtype=np.float64))
+        filled = np.concatenate([_filled(take) for take in takes])
         factors = MotionFactors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
-        factors, rates, left = _paced(factors, X)
-        own, clock = factors.with_noise(-(sigma**2), LEAST_VARIANCE), np.array([seconds, sigma])
+        clocks = np.array(seconds) / seconds[0]
+        factors, rates, left = _paced(factors, _stretches(takes, clocks))
+        own, clock = factors.with_noise(-(sigma**2), LEAST_VARIANCE), np.array([seconds[0], sigma])
         return cls(own, rates, *_rest(left, sigma), clock)
 
     def seen_with(self, sigma: float) -> MotionFactors:
@@ -127,30 +141,83 @@ def _spread(indices: IntArray, most: int) -> IntArray:
     return indices[np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))]
 
 
-def _paced(factors: MotionFactors, X: FloatArray) -> tuple[MotionFactors, FloatArray, FloatArray]:
-    """Factors in units of their deviation, the rate of each, and the residuals.
+def _filled(X: FloatArray) -> FloatArray:
+    """A take with its gaps filled along straight lines; what it never shows, by the mean, 0."""
+    seen = ~np.isnan(X).all(axis=0)
+    filled = np.zeros_like(X)
+    filled[:, seen] = interpolated(X[:, seen], np.arange(len(X), dtype=np.float64))
+    return filled
 
-    The residuals are those of stretches of the take, (length, stretches, d).
-    """
-    length = min(STRETCH, len(X))
-    shown = np.lib.stride_tricks.sliding_window_view((~np.isnan(X)).mean(axis=1), length)
-    starts = np.arange(len(shown))
-    starts = _spread(starts[shown.mean(axis=1) >= SHOWN * shown.mean(axis=1).max()], STRETCHES)
-    windows = X[starts + np.arange(length)[:, None]]
+
+class _Stretches(NamedTuple):
+    """Stretches of one take, (length, n, d), and its time from frame to frame, relative."""
+
+    frames: FloatArray
+    clock: float
+
+
+def _stretches(takes: Sequence[FloatArray], clocks: FloatArray) -> list[_Stretches]:
+    """`STRETCHES` of all takes, evenly spread over those that show enough."""
+    length = min(STRETCH, max(map(len, takes)))
+    parts = [
+        (take, clock) for take, clock in zip(takes, clocks, strict=True) if len(take) >= length
+    ]
+    shown = [
+        np.lib.stride_tricks.sliding_window_view((~np.isnan(take)).mean(axis=1), length).mean(
+            axis=1
+        )
+        for take, _ in parts
+    ]
+    ends = np.cumsum([0, *map(len, shown)])
+    of_all = np.concatenate(shown)
+    chosen = _spread(np.flatnonzero(of_all >= SHOWN * of_all.max()), STRETCHES)
+    found = []
+    for (take, clock), start, end in zip(parts, ends[:-1], ends[1:], strict=True):
+        own = chosen[(chosen >= start) & (chosen < end)] - start
+        if len(own):
+            found.append(_Stretches(take[own + np.arange(length)[:, None]], float(clock)))
+    return found
+
+
+def _paced(
+    factors: MotionFactors, stretches: Sequence[_Stretches]
+) -> tuple[MotionFactors, FloatArray, list[_Stretches]]:
+    """Factors in units of their deviation, the rate of each, and the residuals of stretches."""
     rates = decay(np.full(factors.count, START))
     for _ in range(ROUNDS):
-        found = _smoothed(factors, windows, rates)
-        square = _squares(found)
-        rates = decay(found.following.mean(axis=(0, 1)) / square)
-        factors = factors.scaled(np.sqrt(square))
-    return factors, rates, windows - factors.frames(_smoothed(factors, windows, rates).mean)
+        found = [_smoothed(factors, one, rates) for one in stretches]
+        squares = np.stack([_squares(one) for one in found])
+        counts = np.array([one.mean.shape[1] for one in found], dtype=np.float64)
+        following = np.stack([one.following.mean(axis=(0, 1)) for one in found])
+        weights = (counts / counts.sum())[:, None] * squares
+        rates = _mean_rate(decay(following / squares), stretches, weights)
+        total = weights.sum(axis=0)
+        factors = factors.scaled(np.sqrt(total))
+    left = [
+        one._replace(frames=one.frames - factors.frames(_smoothed(factors, one, rates).mean))
+        for one in stretches
+    ]
+    return factors, rates, left
 
 
-def _smoothed(factors: MotionFactors, windows: FloatArray, rates: FloatArray) -> Smoothed:
-    """The factors of stretches (length, stretches, d), each on its own."""
-    shape, q = windows.shape[:2], factors.count
+def _mean_rate(
+    rates: FloatArray, stretches: Sequence[_Stretches], weights: FloatArray
+) -> FloatArray:
+    """Rates for frames of the first take, (q,), from those of each take's frames, by weights."""
+    total = weights.sum(axis=0)
+    even = np.full_like(weights, 1.0 / len(weights))
+    shares = np.divide(weights, total, out=even, where=total > 0.0)
+    clocks = np.array([one.clock for one in stretches])
+    return np.asarray((shares * (rates / clocks[:, None])).sum(axis=0))
+
+
+def _smoothed(factors: MotionFactors, stretches: _Stretches, rates: FloatArray) -> Smoothed:
+    """The factors of stretches, each on its own."""
+    windows, q = stretches.frames, factors.count
+    shape = windows.shape[:2]
     precision, pull = factors.information(windows.reshape(-1, windows.shape[2]))
-    return smooth_factors(precision.reshape(*shape, q, q), pull.reshape(*shape, q), rates)
+    own = np.minimum(rates * stretches.clock, QUICKEST)
+    return smooth_factors(precision.reshape(*shape, q, q), pull.reshape(*shape, q), own)
 
 
 def _squares(found: Smoothed) -> FloatArray:
@@ -159,21 +226,25 @@ def _squares(found: Smoothed) -> FloatArray:
     return np.asarray((found.mean**2 + own).mean(axis=(0, 1)))
 
 
-def _rest(left: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Variance and rate of the residual of the factors, from stretches (length, stretches, d).
+def _rest(left: Sequence[_Stretches], sigma: float) -> tuple[FloatArray, FloatArray]:
+    """Variance and rate of the residual of the factors, from stretches.
 
     A column that no stretch shows is taken to be like the others.
     """
-    variance = _mean_square(left) - sigma**2
+    variance = _mean_square([one.frames for one in left]) - sigma**2
     variance = np.maximum(np.where(np.isnan(variance), np.nanmedian(variance), variance), 0.0)
     variance = np.maximum(variance, max(sigma**2 * 1e-2, LEAST_VARIANCE))
-    rough = np.maximum(_mean_square(np.diff(left, axis=0)) / 2.0 - sigma**2, 0.0)
-    return variance, decay(1.0 - np.where(np.isnan(rough), variance, rough) / variance)
+    steps = [np.diff(one.frames, axis=0) for one in left]
+    rough = [np.maximum(_mean_square([own]) / 2.0 - sigma**2, 0.0) for own in steps]
+    rates = [decay(1.0 - np.where(np.isnan(own), variance, own) / variance) for own in rough]
+    counts = [(~np.isnan(own)).sum(axis=(0, 1), dtype=np.float64) for own in steps]
+    return variance, _mean_rate(np.stack(rates), left, np.stack(counts))
 
 
-def _mean_square(values: FloatArray) -> FloatArray:
-    """Mean square of each column of (..., d), (d,); NaN where all is NaN."""
-    known = ~np.isnan(values)
-    count = known.sum(axis=(0, 1))
-    total = (np.where(known, values, 0.0) ** 2).sum(axis=(0, 1))
+def _mean_square(parts: Sequence[FloatArray]) -> FloatArray:
+    """Mean square of each column of arrays (..., d), (d,); NaN where all is NaN."""
+    known = [~np.isnan(part) for part in parts]
+    count = np.asarray(sum(one.sum(axis=(0, 1)) for one in known))
+    squares = (np.where(one, part, 0.0) ** 2 for one, part in zip(known, parts, strict=True))
+    total = np.asarray(sum(one.sum(axis=(0, 1)) for one in squares))
     return np.asarray(np.where(count, total, np.nan) / np.maximum(count, 1))

@@ -1,0 +1,127 @@
+"""Several takes of one actor with poses of one character, that are learned from together.
+
+Each stays a take of its own, with its own clock; they share the source's names, the unit and the
+controls, which `facert.data.matching_takes` sees to. `Takes.joined` is their frames one after the
+other, for all that looks at frames one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.take import Take
+
+PAUSE = 1.0
+"""Seconds between two takes where their frames stand one after the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Takes:
+    """Takes with the same source, unit and controls.
+
+    Parameters
+    ----------
+    parts : sequence of Take
+    names : sequence of str
+        Of each take, for messages: its file.
+    animation : array, shape (n, P), or None
+        Poses without a frame: those of all takes, and others.
+    """
+
+    parts: tuple[Take, ...]
+    names: tuple[str, ...]
+    animation: FloatArray | None = None
+
+    @cached_property
+    def starts(self) -> IntArray:
+        """Index of each take's first frame among those of all, and the number of all, (n + 1,)."""
+        return np.cumsum([0, *map(len, self.parts)], dtype=np.int64)
+
+    @property
+    def named(self) -> list[tuple[Take, str]]:
+        """Each take with its name; a single one needs none."""
+        names = self.names if len(self.parts) > 1 else ("",)
+        return list(zip(self.parts, names, strict=True))
+
+    @property
+    def labels(self) -> int:
+        """Number of posed frames of all takes."""
+        return sum(len(part.labels) for part in self.parts)
+
+    def with_parts(self, parts: Sequence[Take]) -> Takes:
+        """The same with other takes in place of these."""
+        return replace(self, parts=tuple(parts))
+
+    def located(self, frames: IntArray) -> tuple[IntArray, IntArray]:
+        """The take of each frame of `joined`, and its number in it, (n,)."""
+        takes = np.searchsorted(self.starts, frames, side="right") - 1
+        return takes, frames - self.starts[takes]
+
+    def indices(self, frames: Sequence[IntArray]) -> IntArray:
+        """The frames of each take by their numbers in `joined`, (n,)."""
+        starts = self.starts[:-1]
+        return np.concatenate([own + start for own, start in zip(frames, starts, strict=True)])
+
+    def frame_name(self, frame: int) -> str:
+        """A frame of `joined` for people: its number, with the file where there are several."""
+        takes, numbers = self.located(np.array([frame]))
+        number = str(numbers[0])
+        return number if len(self.parts) == 1 else f"{self.names[takes[0]]}:{number}"
+
+    @cached_property
+    def joined(self) -> Take:
+        """All frames, one take after the other, with all animation; a single take is itself.
+
+        From one take to the next no frame follows another.
+        """
+        first = self.parts[0]
+        if len(self.parts) == 1:
+            return replace(first, animation=self.animation)
+        return Take(
+            time=_one_after_the_other([part.time for part in self.parts]),
+            source=first.source.followed_by([part.source for part in self.parts[1:]]),
+            controls=first.controls,
+            params=self._poses("params"),
+            std=self._poses("std"),
+            animation=self.animation,
+            fps=first.fps,
+            units=first.units,
+            up_axis=first.up_axis,
+        )
+
+    def _poses(self, field: str) -> FloatArray | None:
+        """Poses of all takes, or their deviations, NaN where a take has none; None without any."""
+        found = [getattr(part, field) for part in self.parts]
+        if all(one is None for one in found):
+            return None
+        assert self.parts[0].controls is not None  # poses come with controls
+        none = np.full(len(self.parts[0].controls.names), np.nan)
+        rows = zip(self.parts, found, strict=True)
+        return np.concatenate(
+            [np.tile(none, (len(part), 1)) if one is None else one for part, one in rows]
+        )
+
+
+def separated(parts: Sequence[FloatArray]) -> FloatArray:
+    """Frames of several takes, (T, d), with a row of NaN between: no step leads from one to next.
+
+    Differences from frame to frame that cross a border are then unknown.
+    """
+    rows = [parts[0]]
+    for part in parts[1:]:
+        rows += [np.full((1, part.shape[1]), np.nan), part]
+    return rows[0] if len(rows) == 1 else np.concatenate(rows)
+
+
+def _one_after_the_other(times: Sequence[FloatArray]) -> FloatArray:
+    """Seconds (T,) in which takes follow each other after a pause."""
+    shifted = [times[0]]
+    for _, time in pairwise(times):
+        shifted.append(time - time[0] + shifted[-1][-1] + PAUSE)
+    return np.concatenate(shifted)
