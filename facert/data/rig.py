@@ -84,12 +84,15 @@ class MeshSequence:
         From frame numbers, shape (n,), to vertices (n, V, 3); NaN where a frame has no pose.
     fps : float
         Nominal frames a second.
+    start_timecode : str
+        Of time 0; empty when unknown.
     """
 
     neutral: Mesh
     time: FloatArray
     fetch: Callable[[IntArray], FloatArray]
     fps: float = 30.0
+    start_timecode: str = ""
 
     def __post_init__(self) -> None:
         time = float_array(self.time, "/time")

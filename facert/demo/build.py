@@ -5,7 +5,7 @@ Right-handed, in cm: x towards the face's own left, y up, z forward. Only the le
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 Point = tuple[float, float, float]
 Colour = tuple[float, float, float]
@@ -154,6 +154,21 @@ ACTOR = Build(
     lid_points=20,
     lip_points=10,
 )
+
+ARKIT = replace(
+    ACTOR,
+    palette=Palette(
+        skin=(0.80, 0.62, 0.50),
+        blush=(0.80, 0.49, 0.42),
+        lips=(0.70, 0.37, 0.35),
+        iris=(0.36, 0.24, 0.14),
+        hair=(0.13, 0.12, 0.13),
+    ),
+    spacing=0.037,
+    lid_points=28,
+    lip_points=14,
+)
+"""The stand-in for a person whose face a phone tracked."""
 
 CHARACTER = Build(
     blobs=(

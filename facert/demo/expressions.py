@@ -24,13 +24,13 @@ _ACTIVATIONS = """
 """
 ACTIVATIONS = tuple(_ACTIVATIONS.split())
 
-_Pull = tuple[tuple[float, float], tuple[float, float, float], float]
+Pull = tuple[tuple[float, float], tuple[float, float, float], float]
 
 
 def expressions(head: Head) -> FloatArray:
     """Displacements (26, V, 3) in cm of all `ACTIVATIONS`, each fully on."""
     muscles = Muscles(head)
-    pulled = {name: muscles.pull(pulls) for name, pulls in _pulls(head.build).items()}
+    pulled = {name: muscles.pull(pulls) for name, pulls in muscles.pulls.items()}
     left = {name: pulled[name] for name in ("brow_outer_up", "brow_down", "smile", "frown")}
     left["blink"] = muscles.close_lids(0.82, 0.18)
     both = {name: pulled[name] for name in ("brow_inner_up", "cheek_raise", "nose_wrinkle")}
@@ -54,12 +54,12 @@ def expressions(head: Head) -> FloatArray:
     return np.stack([shapes[name] for name in ACTIVATIONS])
 
 
-def _pulls(build: Build) -> dict[str, tuple[_Pull, ...]]:
+def _pulls(build: Build) -> dict[str, tuple[Pull, ...]]:
     """The muscles of the left half that only pull: point of the front view, way, radius."""
     brow, width = build.brow, build.mouth.width
     (ix, iy), (ax, ay), (ox, oy) = brow.inner, brow.arch, brow.outer
     (cheek_x, cheek_y), (nose_x, nose_y) = build.cheek, build.nose
-    corner = _mouth_corner(build)
+    corner = mouth_corner(build)
     return {
         "brow_inner_up": (((ix + 0.2, iy + 0.1), (-0.12, 0.85, 0.1), 1.15),),
         "brow_outer_up": ((((ax + ox) / 2, (ay + oy) / 2), (0.05, 0.9, 0.05), 1.5),),
@@ -88,7 +88,8 @@ def _pulls(build: Build) -> dict[str, tuple[_Pull, ...]]:
     }
 
 
-def _mouth_corner(build: Build) -> tuple[float, float]:
+def mouth_corner(build: Build) -> tuple[float, float]:
+    """The left corner of the mouth in front view."""
     mouth = build.mouth
     return mouth.width * 1.04, mouth.centre[1] + 0.65 * mouth.curve * mouth.width
 
@@ -103,17 +104,18 @@ class Muscles:
 
     def __init__(self, head: Head) -> None:
         self.head, self.build = head, head.build
+        self.pulls = _pulls(head.build)
         self.rest = head.vertices
         skin = head.tissue == Tissue.SKIN
         # Ears and the back of the head stay where they are.
-        self.soft = skin * _smoothstep(self.rest[:, 2], -1.0, 2.5)
+        self.soft = skin * smoothstep(self.rest[:, 2], -1.0, 2.5)
         # The lids rest on the eyeball: only `close_lids` moves their edges.
         for row, follow in zip(head.lids, (0.0, 0.0, 0.5, 0.85), strict=True):
             self.soft[row] *= follow
             self.soft[head.mirror[row]] *= follow
         self.lower = self._lower_lip()
 
-    def pull(self, pulls: Sequence[_Pull]) -> FloatArray:
+    def pull(self, pulls: Sequence[Pull]) -> FloatArray:
         """Pull the vertices near points of the front view, less so further away."""
         parts = []
         for centre, way, radius in pulls:
@@ -186,11 +188,11 @@ class Muscles:
                 sin * arm[:, 1] + cos * arm[:, 2],
             ]
         )
-        return self._jaw()[:, None] * (turned - arm)
+        return self.jaw_weight()[:, None] * (turned - arm)
 
     def jaw_left(self) -> FloatArray:
         """Jaw to the left."""
-        return self._jaw()[:, None] * [0.65 * self.build.motion, 0.0, 0.0]
+        return self.jaw_weight()[:, None] * [0.65 * self.build.motion, 0.0, 0.0]
 
     def _on_lips(self, way: ArrayLike, radius: float) -> FloatArray:
         return np.asarray(self.build.motion * self._around_lips(radius)[:, None] * np.asarray(way))
@@ -205,16 +207,16 @@ class Muscles:
     def _narrow(self, part: float) -> FloatArray:
         """Corners of the mouth in and forward."""
         width = self.build.mouth.width * part / self.build.motion
-        corner = self.pull([(_mouth_corner(self.build), (-width, 0.0, 0.35), 1.15)])
+        corner = self.pull([(mouth_corner(self.build), (-width, 0.0, 0.35), 1.15)])
         return corner + self.mirrored(corner)
 
-    def _jaw(self) -> FloatArray:
+    def jaw_weight(self) -> FloatArray:
         """Weight from 0 to 1 by which each vertex follows the jaw, (V,)."""
         z, chin = self.build.hinge[1], self.build.chin[1]
-        front = _smoothstep(self.rest[:, 2], z - 0.5, z + 4.0)
-        neck = _smoothstep(self.rest[:, 1], chin - 3.2, chin - 0.6)
-        under = _smoothstep(self.rest[:, 2], z + 1.5, z + 5.5)
-        throat = under + (1 - under) * _smoothstep(self.rest[:, 1], chin, chin + 3.0)
+        front = smoothstep(self.rest[:, 2], z - 0.5, z + 4.0)
+        neck = smoothstep(self.rest[:, 1], chin - 3.2, chin - 0.6)
+        under = smoothstep(self.rest[:, 2], z + 1.5, z + 5.5)
+        throat = under + (1 - under) * smoothstep(self.rest[:, 1], chin, chin + 3.0)
         skin = self.lower * front * neck * throat * (self.head.tissue == Tissue.SKIN)
         return np.where(self.head.tissue == Tissue.JAW, 1.0, skin)
 
@@ -224,7 +226,7 @@ class Muscles:
         aside = np.maximum(np.abs(self.rest[:, 0]) - 0.4 * mouth.width, 0)
         slope = 0.25 + 0.7 * aside
         line = mouth.centre[1] + mouth.curve * mouth.width * 0.4
-        weight = _smoothstep(line - self.rest[:, 1], -slope, slope)
+        weight = smoothstep(line - self.rest[:, 1], -slope, slope)
         half = lips.shape[1] // 2
         round_off = np.abs(np.cos(np.linspace(0, np.pi, lips.shape[1]))) ** 0.6
         sign = np.sign(np.arange(lips.shape[1]) - half)
@@ -238,6 +240,7 @@ class Muscles:
         return self.build.mouth.width / 2.4
 
 
-def _smoothstep(x: FloatArray, low: float | FloatArray, high: float | FloatArray) -> FloatArray:
+def smoothstep(x: FloatArray, low: float | FloatArray, high: float | FloatArray) -> FloatArray:
+    """0 up to `low`, 1 from `high` on, and smooth between."""
     t = np.clip((x - low) / (high - low), 0, 1)
     return np.asarray(t * t * (3 - 2 * t))

@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.names import ARKIT_SHAPES
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.demo import acting, build
+from facert.demo.arkit import arkit_shapes
 from facert.demo.character import CONTROLS, animate, control_shapes
 from facert.demo.expressions import ACTIVATIONS, expressions
 from facert.demo.head import Head, make_head, marker_vertices
@@ -66,6 +68,13 @@ def character_rig() -> Rig:
     head = make_head(build.CHARACTER)
     names = tuple(control.name for control in CONTROLS)
     return _rig(head, control_shapes(expressions(head)), names)
+
+
+@cache
+def arkit_face() -> Rig:
+    """A face with the 52 shapes of ARKit, to look at weights that a phone tracked."""
+    head = make_head(build.ARKIT, inner=True)
+    return _rig(head, arkit_shapes(head), ARKIT_SHAPES)
 
 
 def write_demo(folder: Path, seed: int = 0, overwrite: bool = False) -> tuple[Path, ...]:

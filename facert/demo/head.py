@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,20 +58,25 @@ class Head:
     lids: IntArray
     lips: IntArray
     """Loops of the left half, see `skin.Skin`."""
+    pieces: Mapping[str, IntArray]
+    """Vertices of the left half by the piece."""
 
 
-def make_head(build: Build) -> Head:
-    """Model a head from its proportions."""
+def make_head(build: Build, inner: bool = False) -> Head:
+    """Model a head from its proportions; with `inner`, tongue, gums and eyeballs to turn."""
     face = skin(build)
-    pieces = [
-        face.piece,
-        parts.eyeball(build),
-        parts.brow(build),
-        *parts.teeth(build),
-        parts.ear(build),
-        parts.hair(build),
-    ]
-    half, tissue = _join(pieces)
+    upper, lower = parts.teeth(build, inner)
+    pieces = {
+        "skin": face.piece,
+        "eyeball": parts.eyeball(build, inner),
+        "brow": parts.brow(build),
+        "upper teeth": upper,
+        "lower teeth": lower,
+        "ear": parts.ear(build),
+        "hair": parts.hair(build),
+    } | ({"tongue": parts.tongue(build)} if inner else {})
+    half, tissue = _join(list(pieces.values()))
+    ends = np.cumsum([len(piece.vertices) for piece in pieces.values()])
     middle = np.abs(half.vertices[:, 0]) < 1e-9
     count = len(half.vertices)
     mirror = np.arange(count)
@@ -85,6 +91,7 @@ def make_head(build: Build) -> Head:
         np.concatenate([mirror, np.flatnonzero(~middle)]),
         face.lids,
         face.lips,
+        dict(zip(pieces, np.split(np.arange(count), ends[:-1]), strict=True)),
     )
 
 

@@ -21,6 +21,8 @@ _FAR = 40.0
 _BISECTIONS = 48  # 40 cm / 2^48: as fine as float64 allows
 WHITE: Colour = (0.95, 0.93, 0.90)
 TOOTH: Colour = (0.93, 0.90, 0.83)
+GUMS: Colour = (0.66, 0.33, 0.33)
+TONGUE: Colour = (0.74, 0.36, 0.37)
 PUPIL: Colour = (0.04, 0.03, 0.04)
 
 
@@ -62,8 +64,9 @@ def _bisect(inside: FloatArray, outside: FloatArray, blobs: Sequence[Blob]) -> F
 
 def _ellipsoid(points: FloatArray, blob: Blob) -> FloatArray:
     scaled = (points - blob.centre) / blob.radii
-    radius = np.linalg.norm(scaled, axis=-1)
-    slope = np.linalg.norm(scaled / blob.radii, axis=-1)
+    radius = np.sqrt(np.einsum("...i,...i", scaled, scaled))
+    scaled /= blob.radii
+    slope = np.sqrt(np.einsum("...i,...i", scaled, scaled))
     return np.asarray(radius * (radius - 1) / np.maximum(slope, 1e-9))
 
 
@@ -121,15 +124,16 @@ def grid_patch(
     return Patch(vertices, strips(grid[order], closed=closed), painted, tissue)
 
 
-def eyeball(build: Build) -> Patch:
-    """Rings around the line of sight, with pupil, iris and white."""
+def eyeball(build: Build, turns: bool = False) -> Patch:
+    """Rings around the line of sight, with pupil, iris and white; more if it turns."""
     eye, sides = build.eye, 20
     edge = 0.02
     angles = np.array(
         [0.0, eye.pupil - edge, eye.pupil + edge, eye.iris - edge, eye.iris + edge, 0.8, 1.1, 1.5]
+        + ([1.9, 2.3] if turns else [])
     )
     iris = np.array(build.palette.iris)
-    colours = np.array([PUPIL, PUPIL, iris, 0.55 * iris, WHITE, WHITE, WHITE, WHITE])
+    colours = np.array([PUPIL, PUPIL, iris, 0.55 * iris] + [WHITE] * (len(angles) - 4))
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     radius, depth = np.sin(angles[1:, None]), np.cos(angles[1:, None]) + 0 * turn
     rings = np.stack([radius * np.cos(turn), radius * np.sin(turn), depth], axis=-1)
@@ -164,23 +168,42 @@ def brow(build: Build) -> Patch:
     return grid_patch((skin + lift * outwards).reshape(4, -1, 3), build.palette.hair)
 
 
-def teeth(build: Build) -> tuple[Patch, Patch]:
-    """The upper row on the skull and the lower row on the jaw."""
+def teeth(build: Build, gums: bool = False) -> tuple[Patch, Patch]:
+    """The upper row on the skull and the lower row on the jaw; with `gums`, wider ones."""
     mouth = build.mouth
-    x = np.linspace(0, 0.82 * mouth.width, 8)
+    x = np.linspace(0, (1.05 if gums else 0.82) * mouth.width, 8)
     front = cast_from_front(np.array([mouth.centre]), build.blobs)[0, 2] - 0.75
     z = front - 0.9 * mouth.width * (x / mouth.width / 1.1) ** 2
     height = mouth.upper + mouth.lower
 
     def row(top: float, bottom: float, tissue: Tissue) -> Patch:
-        y = mouth.centre[1] + np.array([bottom, top])
+        levels, colours = [bottom, top], [TOOTH, TOOTH]
+        if gums and top > 0:
+            levels, colours = [bottom, top, 1.01 * top, 2 * top], [TOOTH, TOOTH, GUMS, GUMS]
+        y = mouth.centre[1] + np.array(levels)
         points = np.stack([np.stack([x, np.full_like(x, level), z], -1) for level in y])
-        return grid_patch(points, TOOTH, tissue)
+        return grid_patch(points, np.repeat(colours, len(x), axis=0), tissue)
 
     return (
         row(0.5 * height, -0.26 * height, Tissue.SKULL),
         row(-0.22 * height, -0.62 * height, Tissue.JAW),
     )
+
+
+def tongue(build: Build) -> Patch:
+    """The left half of a tongue that lies behind the teeth, from its root to the tip."""
+    mouth, rows, sides = build.mouth, 12, 9
+    front = cast_from_front(np.array([mouth.centre]), build.blobs)[0, 2]
+    along = np.linspace(0, 1, rows)[:, None]
+    turn = np.linspace(0, np.pi, sides)  # from the top over the side to below
+    girth = np.sqrt(np.maximum(1 - np.maximum((along - 0.5) / 0.5, 0) ** 2.4, 0.01))
+    x = 0.40 * mouth.width * girth * np.sin(turn)
+    groove = 0.10 * np.exp(-((np.sin(turn) / 0.25) ** 2)) * (np.cos(turn) > 0)
+    y = mouth.centre[1] - 0.27 + 0.24 * girth * (np.cos(turn) - groove)
+    z = front - 2.75 + 1.65 * along + 0 * turn
+    points = np.stack([x, y, z], axis=-1)
+    points[:, [0, -1], 0] = 0
+    return grid_patch(points, TONGUE, Tissue.JAW, order=np.s_[:, ::-1])
 
 
 def ear(build: Build) -> Patch:

@@ -18,6 +18,7 @@ TURN = -0.22  # radians; seen a little from the side, a face has more shape
 _LOOKED_AT = 16  # frames that show how much room a face needs
 _MOST_ROOM = 1.3
 _SAMPLED = 100  # vertices that distinguish the frames of a mesh
+ACTOR = "actor"  # the label of his face
 INK = "#3a3f47"  # of what is written and drawn beside faces
 
 
@@ -27,6 +28,8 @@ class Face:
 
     label: str
     motion: MeshSequence
+    blank: str = "no pose"
+    """What is written where a frame has no vertices."""
 
     def picture(self, vertices: FloatArray, camera: Camera, pixels: int) -> FloatArray | None:
         """The face with these vertices (V, 3), RGBA (pixels, pixels, 4); None if any is NaN."""
@@ -66,7 +69,8 @@ def posed_face(take: Take, rig: Rig, label: str) -> Face:
     def fetch(frames: IntArray) -> FloatArray:
         return rig.deform(settings[frames])
 
-    return Face(label, MeshSequence(rig.mesh, take.time, fetch, take.fps))
+    motion = MeshSequence(rig.mesh, take.time, fetch, take.fps, take.start_timecode)
+    return Face(label, motion)
 
 
 def actor_face(take: Take, rig: Rig) -> Face:
@@ -83,8 +87,15 @@ def actor_face(take: Take, rig: Rig) -> Face:
         raise _misfit("shapes for the take's weights", f"none for {take.source.names[0]!r}")
     columns = [take.source.names.index(name) for name in known]
     weights = np.nan_to_num(take.source.values[:, columns]) @ shape_drivers(known, rig.names)
-    motion = MeshSequence(rig.mesh, take.time, lambda rows: rig.deform(weights[rows]), take.fps)
-    return Face("actor", motion)
+    return driven_face(take, rig, weights)
+
+
+def driven_face(take: Take, rig: Rig, weights: FloatArray) -> Face:
+    """The face of a take's actor: a rig with weights (T, K), NaN where nothing was observed."""
+    motion = MeshSequence(
+        rig.mesh, take.time, lambda rows: rig.deform(weights[rows]), take.fps, take.start_timecode
+    )
+    return Face(ACTOR, motion, "not tracked")
 
 
 def drives(rig: Rig, names: Sequence[str]) -> bool:
