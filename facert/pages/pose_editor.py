@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, IntArray
+from facert.data.sides import counterparts
 from facert.data.take import Controls
 from facert.posing.completed_pose import FAR
 from facert.posing.completion import Completion, Posed
@@ -15,6 +17,24 @@ from facert.posing.correction import correct
 from facert.preprocess.known_poses import Given, KnownPoses
 
 KEPT = 32  # sets of pinned controls whose completion is kept: going back to one costs nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """What was done to a pose."""
+
+    pins: Mapping[int, float]
+    """Values of the controls that are held."""
+    start: FloatArray | None
+    """What the pose began with, (P,); None for the neutral pose."""
+    std: FloatArray | None
+    chosen: bool
+    """Whether a person chose to begin with it, rather than the frame having it."""
+
+    @property
+    def is_change(self) -> bool:
+        """Whether the pose is another than the frame began with."""
+        return bool(self.pins) or self.chosen
 
 
 class PoseEditor:
@@ -36,10 +56,17 @@ class PoseEditor:
         self.controls = controls
         self.known = known
         self.pins: dict[int, float] = {}
+        self.counterparts: IntArray = counterparts(controls.names)
         self._completion = lru_cache(KEPT)(self._learn_completion)
         self._start: FloatArray | None = None
         self._start_std: FloatArray | None = None
+        self._chosen = False
         self._posed = self._solve(0, 0)
+
+    @property
+    def edit(self) -> Edit:
+        """What was done so far; `restore` goes back to it."""
+        return Edit(dict(self.pins), self._start, self._start_std, self._chosen)
 
     @property
     def pose(self) -> FloatArray:
@@ -57,6 +84,14 @@ class PoseEditor:
         return np.clip(np.zeros(len(self.controls.names)), *slider_bounds(self).T)
 
     @property
+    def one_sided_pin(self) -> int | None:
+        """The control that was pinned last, if its counterpart is not pinned at its value."""
+        pin = next(reversed(self.pins), None)
+        if pin is None or self.counterparts[pin] == pin:
+            return None
+        return pin if self.pins.get(int(self.counterparts[pin])) != self.pins[pin] else None
+
+    @property
     def from_neutral(self) -> bool:
         """Whether editing began at the neutral pose."""
         return self._start is None
@@ -70,9 +105,17 @@ class PoseEditor:
         return self._completion(tuple(sorted(self.pins))).farness(given.values) > FAR
 
     def begin(self, pose: FloatArray | None, std: FloatArray | None = None) -> None:
-        """Start from a pose (P,) with nothing pinned; from the neutral one without it."""
-        self.pins = {}
-        self._start, self._start_std = pose, std
+        """Start from a frame's pose (P,) with nothing pinned; from the neutral one without it."""
+        self.restore(Edit({}, pose, std, chosen=False))
+
+    def begin_anew(self, pose: FloatArray | None) -> None:
+        """Start from a pose that a person chose instead, or the neutral one."""
+        self.restore(Edit({}, pose, None, chosen=True))
+
+    def restore(self, edit: Edit) -> None:
+        """Go back to what was done once."""
+        self.pins = dict(edit.pins)
+        self._start, self._start_std, self._chosen = edit.start, edit.std, edit.chosen
         self._posed = self._solve(0, 0)
 
     def pin(self, control: int, value: float) -> None:
@@ -81,7 +124,9 @@ class PoseEditor:
 
     def pin_all(self, pins: Mapping[int, float]) -> None:
         """Hold some controls as well."""
-        self.pins |= pins
+        for control, value in pins.items():
+            self.pins.pop(control, None)  # the one that was pinned last comes last
+            self.pins[control] = value
         self._posed = self._solve(0, 0)
 
     def let_go(self, control: int) -> None:
@@ -91,7 +136,21 @@ class PoseEditor:
 
     def let_all_go(self) -> None:
         """Let all controls follow."""
-        self.begin(self._start, self._start_std)
+        self.pins = {}
+        self._posed = self._solve(0, 0)
+
+    def mirror(self) -> None:
+        """Exchange left and right; controls without a side stay as they are."""
+        pose = self._limited(self.pose[self.counterparts])
+        pins = {int(self.counterparts[pin]): 0.0 for pin in self.pins}
+        self.restore(Edit({pin: float(pose[pin]) for pin in pins}, pose, None, chosen=True))
+
+    def pin_counterpart(self, control: int) -> None:
+        """Hold a pinned control's counterpart on the other side at its value."""
+        other = int(self.counterparts[control])
+        pose = self.pose.copy()
+        pose[other] = self.pins[control]
+        self.pin(other, float(self._limited(pose)[other]))
 
     def learn(self, known: KnownPoses | None) -> None:
         """Replace the known poses that completions are learned from."""
@@ -105,7 +164,7 @@ class PoseEditor:
 
     def adopt(self, sample: FloatArray) -> None:
         """Go on from a sample: the pins stay, and the other controls begin where it has them."""
-        self._start, self._start_std = sample, None
+        self._start, self._start_std, self._chosen = sample, None, True
         self._posed = self._solve(0, 0)
 
     def _solve(self, samples: int, seed: int) -> Posed:
@@ -123,6 +182,11 @@ class PoseEditor:
         spread = np.zeros_like(base) if self._start_std is None else self._start_std
         drawn = self.known.poses[rng.permutation(len(self.known.poses))[:samples]]
         return Posed(base, spread, drawn)
+
+    def _limited(self, pose: FloatArray) -> FloatArray:
+        """A pose (P,) within the declared limits: those of two sides may differ."""
+        limits = self.controls.limits
+        return pose if limits is None else np.asarray(np.clip(pose, *limits.T))
 
     def _given(self) -> Given:
         chosen = sorted(self.pins)

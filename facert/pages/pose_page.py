@@ -5,34 +5,37 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from functools import partial
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from viser import Icon
 
-from facert.data.arrays import FloatArray
-from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.errors import InputError
-from facert.pages.paint import skin
-from facert.pages.pose_editor import PoseEditor, slider_bounds
+from facert.pages.history import Change, FrameState, History
+from facert.pages.keys import add_key, add_play_keys
+from facert.pages.pose_editor import Edit, PoseEditor
+from facert.pages.pose_panels import (
+    AFTER,
+    BEFORE,
+    LearningPanel,
+    PosePanel,
+    SaveBar,
+    add_sliders,
+)
+from facert.pages.pose_stage import SAMPLES, PoseStage
 from facert.pages.server import show_errors
 from facert.pages.session import PosingSession, Trained
-from facert.pages.stage import ActorParts, FacePart, Stage
-from facert.pages.widgets import ButtonList, Sliders, Timeline
+from facert.pages.widgets import ButtonList, Timeline
 from facert.pages.worker import PlayedPage, Worker
 from facert.render.faces import Face
 
 if TYPE_CHECKING:
-    from viser import GuiHtmlHandle, ViserServer
+    from viser import ViserServer
 
 log = logging.getLogger(__name__)
 
 SUGGESTED = 5
-SAMPLES = 3  # other plausible poses
-LEFT, RIGHT = 330, 320  # pixels of the panels
-TRAIN, TRAINING = "Train on the labels", "Training ..."
+RIGHT = 320  # pixels of the panel
 
 
 class PosePage(PlayedPage):
@@ -56,13 +59,13 @@ class PosePage(PlayedPage):
     ) -> None:
         super().__init__(server, np.zeros(1) if session.take is None else session.take.time, RIGHT)
         self.session, self.editor = session, PoseEditor(session.controls, session.known)
+        self.history = History()
         self._seed = 0
-        self._drafts: dict[int, dict[int, float]] = {}  # what is pinned in frames that were left
-        self._stage = _PoseStage(server, rig, session, actor)
-        self._add_sliders()
-        self._add_take()
-        self._add_pose()
-        self._add_learning()
+        self._drafts: dict[int, Edit] = {}  # of frames that were left before they were saved
+        self._stage = PoseStage(server, rig, session, actor)
+        self._add_panels()
+        self._add_keys()
+        self._mark()
         self.start()
         self.slow = Worker(show_errors(server))
         self.seek(0)
@@ -73,21 +76,67 @@ class PosePage(PlayedPage):
         self.slow.stop()
         super().stop()
 
+    @property
+    def unsaved(self) -> list[int]:
+        """The frames, rising, whose pose was changed and not saved."""
+        here = {self.playback.frame} if self.editor.edit.is_change else set()
+        return sorted(here | self._drafts.keys())
+
     def pin(self, control: int, value: float) -> None:
         """Hold a control; the others follow."""
-        self._change(("pin", control), lambda: self.editor.pin(control, value))
+        name = self.editor.controls.names[control]
+        self._change(("pin", control), name, lambda: self.editor.pin(control, value))
 
     def let_go(self, control: int) -> None:
         """Let a control follow."""
-        self._change(("let go", control), lambda: self.editor.let_go(control))
+        self._change(object(), "letting go", lambda: self.editor.let_go(control))
+
+    def let_all_go(self) -> None:
+        """Let all controls follow."""
+        self._change(object(), "letting go", self.editor.let_all_go)
+
+    def start_from_neutral(self) -> None:
+        """Begin the pose anew."""
+        self._change(object(), "start from neutral", lambda: self.editor.begin_anew(None))
+
+    def mirror(self) -> None:
+        """Exchange left and right of the pose."""
+        self._change(object(), "mirror", self.editor.mirror)
+
+    def pin_counterpart(self) -> None:
+        """Pose the other side like the control that was pinned last."""
+
+        def pin() -> None:
+            if (control := self.editor.one_sided_pin) is not None:
+                self.editor.pin_counterpart(control)
+
+        self._change(object(), "the other side", pin)
+
+    def copy(self, which: str) -> None:
+        """Begin with the pose of a key: `BEFORE` this frame, `AFTER` it, or the nearest in time."""
+
+        def copy() -> None:
+            key = self._key(which)
+            self.editor.begin_anew(self.session.pose(key)[0])
+            self._bar.news.write(f"Begun with the pose of frame {key}.")
+
+        self._change(object(), "copy", copy)
 
     def save(self) -> None:
         """Make the pose the label of the frame."""
-        self.worker.do("save", self._save)
+        self._change(object(), "save", self._save)
+
+    def undo(self) -> None:
+        """Take back the last change, also one that was saved."""
+        self.worker.do(object(), lambda: self._restore(self.history.undo(), back=True))
+
+    def redo(self) -> None:
+        """Make the change anew that was taken back last."""
+        self.worker.do(object(), lambda: self._restore(self.history.redo(), back=False))
 
     def train(self) -> None:
         """Train on all labels, and show the result."""
-        self._train_button.disabled, self._train_button.label = True, TRAINING
+        self._learning.show_training(True)
         self.slow.do("train", self._train)
 
     def suggest(self) -> None:
@@ -95,40 +144,73 @@ class PosePage(PlayedPage):
         if self.session.take is not None:
             self.slow.do("suggest", self._suggest)
 
-    def _change(self, key: object, change: Callable[[], None]) -> None:
-        """Change the pose in the worker, and show it."""
+    def sample(self) -> None:
+        """Show other plausible poses."""
+        self.worker.do("sample", self._sample)
+
+    def adopt(self, number: int) -> None:
+        """Go on from one of the other plausible poses."""
+        self._change(object(), "another pose", lambda: self.editor.adopt(self._samples[number]))
+
+    def _change(self, kind: object, what: str, change: Callable[[], None]) -> None:
+        """Change the pose in the worker, so that it can be undone, and show it."""
 
         def task() -> None:
+            before = self._state
             change()
+            self.history.add(Change(what, before, self._state), kind)
             self._show()
 
-        self.worker.do(key, task)
+        self.worker.do(kind, task)
 
-    def _go(self, frame: int) -> None:
-        if self.editor.pins:
-            self._drafts[self.playback.frame] = dict(self.editor.pins)
-        super()._go(frame)
+    @property
+    def _state(self) -> FrameState:
+        frame = self.playback.frame
+        return FrameState(frame, self.editor.edit, self.session.saved_pose(frame))
+
+    def _restore(self, change: Change | None, back: bool) -> None:
+        """Take a change back, or make it anew, in the frame where it was made."""
+        word = "Undone" if back else "Done again"
+        if change is None:
+            self._bar.news.write(f"Nothing to {'undo' if back else 'do again'}.")
+            return
+        was, now = (change.after, change.before) if back else (change.before, change.after)
+        if now.saved is not was.saved:
+            self.session.put(now.frame, now.saved)
+            self._learned_labels()
+        if self.playback.frame != now.frame:
+            self._go(now.frame)
+        self.editor.restore(now.edit)
+        self._show()
+        self._bar.news.write(f"{word}: {change.what}, frame {now.frame}.")
+
+    def _leave(self) -> None:
+        if self.editor.edit.is_change:
+            self._drafts[self.playback.frame] = self.editor.edit
 
     def _show_frame(self) -> None:
-        """Begin with the frame's label or prediction, and with what was pinned there before."""
+        """Begin with the frame's label or prediction, and with what was changed there before."""
         frame = self.playback.frame
         if self.session.take is not None:
             self.editor.begin(*self.session.pose(frame))
-            self.editor.pin_all(self._drafts.pop(frame, {}))
+            draft = self._drafts.pop(frame, None)
+            if draft is not None and draft.chosen:
+                self.editor.restore(draft)
+            elif draft is not None:
+                self.editor.pin_all(draft.pins)
         self._show()
 
     def _show(self) -> None:
         frame, editor = self.playback.frame, self.editor
         self._stage.draw(frame, editor.pose)
         self._sliders.show(editor.pose, editor.pins)
-        names = editor.controls.names
-        self._pins.show({pin: f"{names[pin]}  {value:.2f}" for pin, value in editor.pins.items()})
-        self._adopt.visible, self._free.visible = False, len(editor.pins) > 1
+        self._pose.show()
         if self._timeline is not None:
             self._timeline.show(frame)
-        self._write(self._status, self._state(frame))
+            self._unsaved.show({other: f"frame {other}" for other in self._drafts})
+        self._pose.status.write(self._status(frame))
 
-    def _state(self, frame: int) -> str:
+    def _status(self, frame: int) -> str:
         """The state of the pose, in a line."""
         editor, session = self.editor, self.session
         if editor.far:
@@ -140,17 +222,34 @@ class PosePage(PlayedPage):
             return f"The other controls follow, ± {spread:.2f}."
         if editor.from_neutral:
             return "Neutral. Move a slider: it is pinned, and the others follow."
+        if editor.edit.chosen:
+            return "Not saved yet. Move what is wrong."
         if session.labelled(frame):
             return "The frame's label."
         return "The model's prediction. Move what is wrong."
 
+    def _key(self, which: str) -> int:
+        """The labelled frame before or after this one, or the nearest in time."""
+        frame, take = self.playback.frame, self.session.take
+        assert take is not None  # the buttons are not shown without one
+        keys = take.labels[take.labels != frame]
+        sides = {BEFORE: keys[keys < frame][-1:], AFTER: keys[keys > frame][:1]}
+        found = sides.get(which, keys)
+        if not len(found):
+            raise InputError("copy", "another key pose there", "none", "Pose and save one.")
+        return int(found[np.abs(take.time[found] - take.time[frame]).argmin()])
+
     def _save(self) -> None:
         frame = self.playback.frame
         path = self.session.save(frame, self.editor.pose)
+        self._learned_labels()
+        self.editor.begin(*self.session.pose(frame))
+        self._bar.news.write(f"Frame {frame} saved to {path.name}.")
+
+    def _learned_labels(self) -> None:
+        """Learn what goes together from the labels as they are now."""
         self.editor.learn(self.session.known)
         self._mark()
-        self._show_frame()
-        self._write(self._news, f"Frame {frame} saved to {escape(path.name)}.")
         self.suggest()
 
     def _train(self) -> None:
@@ -158,19 +257,19 @@ class PosePage(PlayedPage):
         try:
             trained = self.session.train()
         finally:
-            self._train_button.disabled, self._train_button.label = False, TRAIN
+            self._learning.show_training(False)
         self.worker.do("trained", partial(self._trained, trained))
         self._suggest()
 
     def _trained(self, trained: Trained) -> None:
         moved = "" if trained.change is None else f" Poses moved by {trained.change:.3f} (RMS)."
         path = self.session.model_path
-        where = "" if path is None else f" {escape(path.name)} is written."
+        where = "" if path is None else f" {path.name} is written."
         self.editor.learn(self.session.known)
-        if not self.editor.pins:
+        if not self.editor.edit.is_change:
             self._show_frame()
         learned = f"Learned from {trained.labels} labels in {trained.seconds:.1f} s."
-        self._write(self._news, learned + moved + where)
+        self._learning.outcome.write(learned + moved + where)
 
     def _suggest(self) -> None:
         """Find the frames to pose next, in the slow worker."""
@@ -188,110 +287,33 @@ class PosePage(PlayedPage):
 
     def _sample(self) -> None:
         self._seed += 1
-        poses = self.editor.samples(SAMPLES, self._seed)
-        self._samples = poses
-        self._stage.show_samples(poses)
-        self._adopt.visible = len(poses) > 0
+        self._samples = self.editor.samples(SAMPLES, self._seed)
+        self._stage.show_samples(self._samples)
+        self._pose.adopt.visible = len(self._samples) > 0
 
     def _mark(self) -> None:
         take = self.session.take
         if take is None or self._timeline is None:
             return
         self._timeline.mark(take.labels)
-        self._train_button.hint = f"{len(take.labels)} labels"
+        self._learning.show_labels(len(take.labels))
 
-    def _add_sliders(self) -> None:
-        panel = self._server.gui.add_panel()
-        with panel.add_tab("Controls"):
-            self._sliders = Sliders(
-                self._server, self.editor.controls.names, slider_bounds(self.editor), self.pin
-            )
-        panel.dock_left()
-        panel.set_width(LEFT)
-
-    def _add_take(self) -> None:
+    def _add_panels(self) -> None:
+        server, there = self._server, self.session.take is not None
+        self._sliders = add_sliders(server, self.editor, self)
         self._timeline: Timeline | None = None
         if self.session.take is not None:
-            self._timeline = Timeline(self._server, self.session.take, self.playback, self.seek)
-            self._suggested = ButtonList(self._server, "Pose next", self.seek)
+            self._timeline = Timeline(server, self.session.take, self)
+            self._suggested = ButtonList(server, "Pose next", self.seek)
+            self._unsaved = ButtonList(server, "Changed and not saved", self.seek)
+        self._pose = PosePanel(server, self)
+        self._learning = LearningPanel(server, self, there)
+        self._bar = SaveBar(server, self, there)
 
-    def _add_pose(self) -> None:
-        gui = self._server.gui
-        self._status = gui.add_html("")
-        self._pins = ButtonList(
-            self._server, "Pinned (click to let go)", self.let_go, Icon.PINNED_OFF
-        )
-        self._free = gui.add_button("Let all go", icon=Icon.PINNED_OFF, color="gray")
-        neutral = gui.add_button("Start from neutral", icon=Icon.MOOD_NEUTRAL, color="gray")
-        other = gui.add_button("Other plausible poses", icon=Icon.ARROWS_SHUFFLE, color="gray")
-        self._adopt = gui.add_button_group(
-            "take over", tuple(f"other {number}" for number in range(1, SAMPLES + 1)), visible=False
-        )
-        self._free.on_click(lambda _: self._change("let all go", self.editor.let_all_go))
-        neutral.on_click(lambda _: self._change("neutral", lambda: self.editor.begin(None)))
-        other.on_click(lambda _: self.worker.do("sample", self._sample))
-
-        @self._adopt.on_click
-        def _(_: object) -> None:
-            chosen = int(self._adopt.value.split()[-1]) - 1
-            self._change("adopt", lambda: self.editor.adopt(self._samples[chosen]))
-
-    def _add_learning(self) -> None:
-        gui = self._server.gui
-        there = self.session.take is not None
-        save = gui.add_button(
-            "Save as this frame's pose", icon=Icon.CHECK, color="green", visible=there
-        )
-        self._train_button = gui.add_button(TRAIN, icon=Icon.SCHOOL, visible=there)
-        self._news = gui.add_html("")
-        save.on_click(lambda _: self.save())
-        self._train_button.on_click(lambda _: self.train())
-        self._mark()
-
-    def _write(self, where: GuiHtmlHandle, text: str) -> None:
-        where.content = f'<div style="padding:4px 12px;font-size:13px">{text}</div>'
-
-
-class _PoseStage:
-    """The stage of the page: the actor in a frame, the posed character, and other poses.
-
-    Raises
-    ------
-    InputError
-        When the rig lacks a shape for a control.
-    """
-
-    def __init__(
-        self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None
-    ) -> None:
-        self._rig, self._drivers = rig, shape_drivers(session.controls.names, rig.names)
-        self._stage = Stage(server)
-        source = None if session.take is None else session.take.source
-        self._actor = ActorParts(server, self._stage, source, actor)
-        own = skin(rig.mesh)
-        self._character = self._stage.add(FacePart(server, "character", rig.mesh, own))
-        self._samples = [
-            FacePart(server, f"other {number}", rig.mesh, own) for number in range(1, SAMPLES + 1)
-        ]
-        for part in self._samples:
-            part.root.visible = False
-            self._stage.add(part, row=1)
-
-    def draw(self, frame: int, pose: FloatArray) -> None:
-        """A frame of the actor, and the character's pose (P,); the samples leave."""
-        self._actor.draw(frame)
-        self._character.draw(self._vertices(pose[None])[0])
-        self.show_samples(np.empty((0, len(pose))))
-
-    def show_samples(self, poses: FloatArray) -> None:
-        """Other poses (n, P) beside the character, at most `SAMPLES`."""
-        changed = sum(part.root.visible for part in self._samples) != len(poses)
-        for part, vertices in zip(self._samples, self._vertices(poses), strict=False):
-            part.draw(vertices)
-        for number, part in enumerate(self._samples):
-            part.root.visible = number < len(poses)
-        if changed:
-            self._stage.arrange()
-
-    def _vertices(self, poses: FloatArray) -> FloatArray:
-        return self._rig.deform(poses @ self._drivers)
+    def _add_keys(self) -> None:
+        add_play_keys(self._server, self)
+        add_key(self._server, "Undo", "Z", self.undo, "cmd/ctrl")
+        add_key(self._server, "Redo", "Z", self.redo, "cmd/ctrl+shift")
+        add_key(self._server, "Mirror the pose", "M", self.mirror)
+        if self.session.take is not None:
+            add_key(self._server, "Save as this frame's pose", "S", self.save, "cmd/ctrl")

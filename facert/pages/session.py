@@ -61,7 +61,7 @@ class PosingSession:
         output: Path | None = None,
     ) -> None:
         self.controls, self.model, self.output = controls, model, output
-        self.saved = 0
+        self._saved: set[int] = set()
         self.take = None if take is None else _labels_only(take, controls)
         self.result: Take | None = None
         self._animation = model.poses if model is not None else None
@@ -104,8 +104,26 @@ class PosingSession:
         std = self.result.std
         return self.result.params[frame], None if std is None else std[frame]
 
+    @property
+    def saved(self) -> int:
+        """How many frames have a pose that was saved in this session."""
+        return len(self._saved)
+
+    def saved_pose(self, frame: int) -> FloatArray | None:
+        """The label of a frame, (P,), if it has one."""
+        take = self.take
+        return (
+            take.params[frame]
+            if take and take.params is not None and frame in take.labels
+            else None
+        )
+
     def save(self, frame: int, pose: FloatArray) -> Path:
-        """Make a pose the label of a frame, and write the take with all labels.
+        """Make a pose the label of a frame, and write the take with all labels; see `put`."""
+        return self.put(frame, pose)
+
+    def put(self, frame: int, pose: FloatArray | None) -> Path:
+        """Make a pose (P,) the label of a frame, or leave it without, and write the take.
 
         The file appears whole or not at all, and the label counts when it is written.
 
@@ -115,14 +133,14 @@ class PosingSession:
             When the file cannot be written.
         """
         take, output = self._require_take()
-        known = take.params
         params = np.full((len(take), len(self.controls.names)), np.nan)
-        if known is not None:
-            params[:] = known
-        params[frame] = pose
+        if take.params is not None:
+            params[:] = take.params
+        params[frame] = np.nan if pose is None else pose
         labelled = replace(take, params=params)
         write_take(labelled, output, overwrite=True)
-        self.take, self.saved = labelled, self.saved + 1
+        self.take = labelled
+        (self._saved.discard if pose is None else self._saved.add)(frame)
         return output
 
     def suggestion(self, count: int) -> Suggestion:

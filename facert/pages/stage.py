@@ -176,10 +176,17 @@ AnyPart = TypeVar("AnyPart", bound=Part)
 
 
 class Stage:
-    """The places of the parts, and the cameras that look at them."""
+    """The places of the parts, and the cameras that look at them.
 
-    def __init__(self, server: ViserServer) -> None:
-        self._server = server
+    Parameters
+    ----------
+    server : ViserServer
+    covered : float
+        Share of the picture's height, from below, that something else covers.
+    """
+
+    def __init__(self, server: ViserServer, covered: float = 0.0) -> None:
+        self._server, self._free = server, 1.0 - covered
         self._rows: list[list[Part]] = []
         self._width, self._height, self._centre = 1.0, HEIGHT, CENTRE
         self._right = np.array([1.0, 0.0, 0.0])
@@ -218,7 +225,8 @@ class Stage:
                 for part, middle in zip(row, middles, strict=True):
                     part.root.position = tuple(middle * self._right - number * HEIGHT * UP)
         filled = sum(bool(row) for row in rows)
-        self._width, self._height = max(widths), max(filled, 1) * HEIGHT
+        rows_height = max(filled, 1) * HEIGHT
+        self._width, self._height = max(widths), rows_height / self._free
         self._centre = CENTRE - (self._height - HEIGHT) / 2.0 * UP
 
     def _distance(self, aspect: float) -> float:

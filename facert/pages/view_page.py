@@ -8,6 +8,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.pages.charts import Chart
+from facert.pages.keys import add_play_keys
 from facert.pages.paint import Paint, Scale, skin
 from facert.pages.stage import ActorParts, FacePart, Stage, face_part
 from facert.pages.view_data import Performance, highest
@@ -43,12 +44,13 @@ class ViewPage(PlayedPage):
         super().__init__(server, performance.take.time, WIDTH)
         self.performance = performance
         self._faces = _Faces(server, performance, actor)
-        self._timeline = Timeline(server, performance.take, self.playback, self.seek)
+        self._timeline = Timeline(server, performance.take, self)
         self._timeline.mark(performance.key_poses)
         self._add_colours()
         self._add_places()
         self._charts: dict[int, Chart] = {}
         self._add_curves()
+        add_play_keys(server, self)
         self._show_frame()
         self.start()
 

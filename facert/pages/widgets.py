@@ -13,15 +13,16 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import control_groups
 from facert.data.take import Take
 from facert.data.timecode import timecode
-from facert.pages.worker import Playback
+from facert.pages.worker import PlayedPage
 
 if TYPE_CHECKING:
     from viser import GuiButtonHandle, GuiEvent, GuiSliderHandle, ViserServer
 
 PIN = "● "
+KEY = "#1f6f8b"
 UNFOLDED = 30  # controls; of more, only the shorter groups are open, such as the jaw's
 FINE = 100  # steps of a slider, at least
-MARKED = 60  # key poses under the slider of frames; more would run together
+TRACK = "-10px 65px 2px 118px"  # from the panel's edges to the track of the slider of frames
 
 
 def unfolded_groups(groups: Mapping[str, IntArray]) -> set[str]:
@@ -93,6 +94,9 @@ class Sliders:
 class ButtonList:
     """A folder of buttons, hidden while it is empty.
 
+    Buttons stay once they are made, and are hidden and named anew: viser stumbles over one that is
+    made, named and removed within a moment.
+
     Parameters
     ----------
     server : ViserServer
@@ -112,23 +116,48 @@ class ButtonList:
     ) -> None:
         self._server, self._clicked, self._icon = server, clicked, icon
         self._folder = server.gui.add_folder(title, visible=False)
-        self._buttons: dict[int, GuiButtonHandle] = {}
+        self._buttons: list[GuiButtonHandle] = []
+        self._keys: list[int] = []
 
     def show(self, labels: Mapping[int, str]) -> None:
         """List buttons with these labels by their keys, in this order."""
-        if list(labels) != list(self._buttons):
-            for button in self._buttons.values():
-                button.remove()
-            self._buttons = {key: self._add(key) for key in labels}
-        for key, label in labels.items():
-            self._buttons[key].label = label
+        while len(self._buttons) < len(labels):
+            self._buttons.append(self._add(len(self._buttons)))
+        self._keys = list(labels)
+        texts = [*labels.values(), *[""] * (len(self._buttons) - len(labels))]
+        for button, text in zip(self._buttons, texts, strict=True):
+            if button.label != text:
+                button.label = text
+            if button.visible != bool(text):
+                button.visible = bool(text)
         self._folder.visible = len(labels) > 0
 
-    def _add(self, key: int) -> GuiButtonHandle:
+    def _add(self, place: int) -> GuiButtonHandle:
         with self._folder:
-            button = self._server.gui.add_button("", color="gray", icon=self._icon)
-        button.on_click(lambda _: self._clicked(key))
+            button = self._server.gui.add_button("", color="gray", icon=self._icon, visible=False)
+        button.on_click(lambda _: self._click(place))
         return button
+
+    def _click(self, place: int) -> None:
+        if place < len(self._keys):
+            self._clicked(self._keys[place])
+
+
+class Text:
+    """A line or two of text, which is never taken for HTML.
+
+    Parameters
+    ----------
+    server : ViserServer
+    """
+
+    def __init__(self, server: ViserServer) -> None:
+        self._html = server.gui.add_html("")
+
+    def write(self, text: str) -> None:
+        """Show a text; each of its lines is one."""
+        lines = "<br>".join(escape(line) for line in text.splitlines())
+        self._html.content = f'<div style="padding:4px 12px;font-size:13px">{lines}</div>'
 
 
 class Timeline:
@@ -138,34 +167,40 @@ class Timeline:
     ----------
     server : ViserServer
     take : Take
-    playback : Playback
-        Playback of the take's frames.
-    seek : callable
-        Called with the frame that was asked for.
+    page : PlayedPage
+        Shows the take's frames.
     """
 
-    def __init__(
-        self, server: ViserServer, take: Take, playback: Playback, seek: Callable[[int], None]
-    ) -> None:
-        self._server, self._take = server, take
-        self._playback, self._seek = playback, seek
+    def __init__(self, server: ViserServer, take: Take, page: PlayedPage) -> None:
+        self._server, self._take, self._page = server, take, page
         self._key_poses: list[int] = []
         self._moment = server.gui.add_html("")
-        self._place = server.gui.add_folder(None)
-        self._slider = self._add_slider()
+        last = max(len(take) - 1, 1)
+        self._slider = server.gui.add_slider("frame", 0, last, 1, page.playback.frame)
+        self._slider.on_update(self._slid)
+        self._marks = server.gui.add_html("")
         self._play = server.gui.add_button("Play", icon=Icon.PLAYER_PLAY)
         steps = server.gui.add_button_group("", ("◂ key", "◂", "▸", "key ▸"))
-        self._play.on_click(lambda _: self._toggle())
+        self._play.on_click(lambda _: page.toggle())
         steps.on_click(lambda event: self._step(str(event.target.value)))
 
     def mark(self, key_poses: IntArray) -> None:
         """Show where the key poses are."""
         self._key_poses = key_poses.tolist()
-        self._slider.remove()  # viser's marks stay as they were made
-        self._slider = self._add_slider()
+        ticks = "".join(f"M{frame} 0v1" for frame in self._key_poses)
+        self._marks.content = (
+            f'<div style="margin:{TRACK}"><svg viewBox="0 0 {max(len(self._take) - 1, 1)} 1"'
+            ' preserveAspectRatio="none" style="width:100%;height:7px;overflow:visible">'
+            f'<path d="{ticks}" stroke="{KEY}" stroke-width="2"'
+            ' vector-effect="non-scaling-stroke"/></svg></div>'
+        )
 
     def show(self, frame: int) -> None:
-        """Show which frame the performance stands at."""
+        """Show which frame the performance stands at, and whether it plays."""
+        label = "Pause" if self._page.playback.playing else "Play"
+        if self._play.label != label:
+            self._play.label = label
+            self._play.icon = Icon.PLAYER_PAUSE if label == "Pause" else Icon.PLAYER_PLAY
         self._slider.value = frame  # type: ignore[misc]
         seconds = float(self._take.time[frame])
         code = timecode(self._take.start_timecode, seconds, self._take.fps)
@@ -173,33 +208,18 @@ class Timeline:
         text = f"frame {frame} of {len(self._take)} · {seconds:.2f} s {escape(code)}{posed}"
         self._moment.content = f'<div style="padding:6px 12px 0;font-size:13px">{text}</div>'
 
-    def _add_slider(self) -> GuiSliderHandle[int]:
-        marks = tuple(self._key_poses) if 0 < len(self._key_poses) <= MARKED else None
-        last = max(len(self._take) - 1, 1)
-        with self._place:
-            slider = self._server.gui.add_slider(
-                "frame", 0, last, 1, self._playback.frame, marks=marks
-            )
-        slider.on_update(self._slid)
-        return slider
-
     def _slid(self, event: GuiEvent[GuiSliderHandle[int]]) -> None:
         if event.client is not None:  # a person, and not the page itself
-            self._seek(int(event.target.value))
-
-    def _toggle(self) -> None:
-        playing = self._playback.playing = not self._playback.playing
-        self._play.label = "Pause" if playing else "Play"
-        self._play.icon = Icon.PLAYER_PAUSE if playing else Icon.PLAYER_PLAY
+            self._page.seek(int(event.target.value))
 
     def _step(self, button: str) -> None:
         """Step to the next frame or key pose, or back."""
         forward = button.endswith("▸")
-        frame = self._playback.frame
+        frame = self._page.playback.frame
         if "key" not in button:
-            self._seek(frame + (1 if forward else -1))
+            self._page.step(1 if forward else -1)
             return
         keys = np.array(self._key_poses, dtype=np.int64)
         beyond = keys[keys > frame] if forward else keys[keys < frame][::-1]
         if len(beyond):
-            self._seek(int(beyond[0]))
+            self._page.seek(int(beyond[0]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Condition, Thread
@@ -28,7 +29,7 @@ Task = Callable[[], None]
 
 
 class Worker:
-    """A thread for tasks, one after the other; of several that wait under one key, the newest.
+    """A thread for tasks, in their order; of neighbours that wait under one key, the newest.
 
     A slider that is dragged sends more values than can be drawn: those in between are left out.
 
@@ -46,7 +47,7 @@ class Worker:
         self, complain: Callable[[str], None], tick: Task | None = None, pause: float = 0.04
     ) -> None:
         self._complain, self._tick, self._pause = complain, tick, pause
-        self._waiting: dict[object, Task] = {}
+        self._waiting: deque[tuple[object, Task]] = deque()
         self._changed = Condition()
         self._open = True
         self._idle = True
@@ -54,10 +55,11 @@ class Worker:
         self._thread.start()
 
     def do(self, key: object, task: Task) -> None:
-        """Queue a task, behind those that wait; one that waits under its key is dropped."""
+        """Queue a task, in place of the one queued last if that waits under the same key."""
         with self._changed:
-            self._waiting.pop(key, None)
-            self._waiting[key] = task
+            if self._waiting and self._waiting[-1][0] == key:
+                self._waiting.pop()
+            self._waiting.append((key, task))
             self._changed.notify_all()
 
     def finish(self, seconds: float = 10.0) -> bool:
@@ -94,7 +96,7 @@ class Worker:
             self._idle = False
             if not self._waiting:
                 return self._tick  # after a pause
-            return self._waiting.pop(next(iter(self._waiting)))
+            return self._waiting.popleft()[1]
 
 
 @dataclass
@@ -142,6 +144,7 @@ class PlayedPage(ABC):
 
     def __init__(self, server: ViserServer, time: FloatArray, width: int) -> None:
         self._server, self.playback = server, Playback(time)
+        self._steps: deque[int] = deque()  # asked for and not yet taken
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(width)
 
@@ -158,15 +161,39 @@ class PlayedPage(ABC):
         """Go to a frame."""
         self.worker.do("seek", lambda: self._go(frame))
 
+    def step(self, frames: int) -> None:
+        """Go so many frames on, or back, and stay there."""
+        self._steps.append(frames)
+        self.worker.do("step", self._take_steps)
+
+    def toggle(self) -> None:
+        """Play, or pause."""
+        self.worker.do(object(), self._toggle)
+
+    def _take_steps(self) -> None:
+        frames = sum(self._steps.popleft() for _ in range(len(self._steps)))
+        self.playback.playing = False
+        self._go(self.playback.frame + frames)
+
+    def _toggle(self) -> None:
+        self.playback.playing = not self.playback.playing
+        self._go(self.playback.frame)
+
     def _go(self, frame: int) -> None:
+        self._leave()
         self.playback.seek(frame)
         self._show_frame()
 
     def _tick(self) -> None:
         now = time.perf_counter()
         passed, self._clock = now - self._clock, now
+        if self.playback.playing:
+            self._leave()
         if self.playback.advance(passed):
             self._show_frame()
+
+    def _leave(self) -> None:  # noqa: B027 - there may be nothing to keep
+        """Keep what belongs to the frame that is shown, before another one may be."""
 
     @abstractmethod
     def _show_frame(self) -> None:

@@ -145,6 +145,65 @@ def test_other_poses_are_shown_and_taken_over(pose_page) -> None:
     assert seen.errors == []
 
 
+def test_it_is_mirrored_undone_and_saved_by_keys_and_by_the_bar(pose_page) -> None:
+    page, seen = pose_page
+    keys, names, editor = seen.page.keyboard, page.session.controls.names, page.editor
+    left, right = names.index("brow_L"), names.index("brow_R")
+    seen.slide("brow_L", 0.6)
+    assert seen.until(lambda: editor.pins == {left: 0.6})
+    seen.page.get_by_role("button", name="brow_R as brow_L").click()
+    assert seen.until(lambda: editor.pins == {left: 0.6, right: 0.6})
+    keys.press("Control+z")
+    assert seen.until(lambda: editor.pins == {left: 0.6})
+    keys.press("m")
+    assert seen.until(lambda: editor.pins == {right: 0.6})
+    assert seen.until(lambda: seen.value("brow_R") == pytest.approx(0.6))
+    mirrored = editor.pose.copy()
+    keys.press("Control+s")
+    assert seen.until(lambda: page.session.labelled(0))
+    np.testing.assert_array_equal(facert.read_take(page.session.output).params[0], mirrored)
+    keys.press("ArrowRight")
+    assert seen.until(lambda: page.playback.frame == 1)
+    keys.press("Control+z")  # of the frame that was left
+    assert seen.until(lambda: not page.session.labelled(0))
+    assert not len(facert.read_take(page.session.output).labels)
+    assert (page.playback.frame, editor.pins) == (0, {right: 0.6})
+    keys.press("Control+Shift+z")
+    assert seen.until(lambda: page.session.labelled(0))
+    keys.press("Shift+ArrowRight")
+    assert seen.until(lambda: page.playback.frame == 10)
+    seen.page.get_by_role("button", name="nearest").click()
+    assert seen.until(lambda: np.array_equal(editor.pose, mirrored))
+    save = seen.page.get_by_role("button", name="Save as this frame's pose")
+    seen.page.mouse.move(1100, 500)
+    seen.page.mouse.wheel(0, 2000)
+    save.click()
+    assert seen.until(lambda: page.session.labelled(10))
+    assert seen.errors == []
+
+
+def test_keys_are_the_pages_after_a_click_and_do_not_turn_the_camera(pose_page) -> None:
+    page, seen = pose_page
+    (client,) = page._server.get_clients().values()
+    before = client.camera.position
+    track = seen._track("jaw_open").locator(".mantine-Slider-track").bounding_box()
+    seen.page.mouse.click(track["x"] + 0.5 * track["width"], track["y"] + 0.5 * track["height"])
+    assert seen.until(lambda: len(page.editor.pins) == 1)
+    for _ in range(3):
+        seen.page.keyboard.press("ArrowRight")
+    seen.page.keyboard.press("ArrowLeft")
+    assert seen.until(lambda: page.playback.frame == 2)
+    assert page.unsaved == [0]
+    seen.page.get_by_role("button", name="Play").click()
+    assert seen.until(lambda: page.playback.playing)
+    seen.page.keyboard.press(" ")
+    assert seen.until(lambda: not page.playback.playing)
+    seen.page.get_by_role("button", name="frame 0").click()
+    assert seen.until(lambda: len(page.editor.pins) == 1)
+    np.testing.assert_array_equal(client.camera.position, before)
+    assert seen.errors == []
+
+
 def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
     """No model and no pose to begin with: what the first day looks like."""
     bare = replace(recording, params=None, animation=None)

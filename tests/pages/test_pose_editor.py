@@ -109,3 +109,29 @@ def test_sliders_reach_limits_or_all_that_is_known(editor, character) -> None:
     limits = np.array([[-1.0, 1], [0, np.inf], [-np.inf, 2], [0, 1]])
     limited = slider_bounds(PoseEditor(Controls(NAMES, limits)))
     assert limited.tolist() == [[-1, 1], [0, 1], [0, 2], [0, 1]]
+
+
+def test_a_mirrored_pose_has_its_sides_exchanged_within_the_limits() -> None:
+    limits = np.array([[0.0, 1.0], [-1.0, 1.0], [0.0, 0.5]])
+    editor = PoseEditor(Controls(["smile_L", "jaw", "smile_R"], limits))
+    editor.begin(np.array([0.8, 0.3, 0.1]))
+    editor.pin(1, -0.2)
+    editor.mirror()
+    assert editor.pose.tolist() == [0.1, -0.2, 0.5]
+    assert editor.pins == {1: -0.2}
+    assert editor.edit.is_change
+    editor.pin(0, 0.4)
+    assert editor.one_sided_pin == 0
+    editor.pin_counterpart(0)
+    assert editor.pose.tolist() == [0.4, -0.2, 0.4]
+    assert editor.one_sided_pin is None
+
+
+def test_what_was_done_is_gone_back_to(editor) -> None:
+    editor.pin(0, 0.2)
+    once, pose = editor.edit, editor.pose.copy()
+    editor.pin(2, 0.1)
+    editor.begin_anew(np.full(4, 0.1))
+    editor.restore(once)
+    np.testing.assert_array_equal(editor.pose, pose)
+    assert editor.pins == {0: 0.2}

@@ -36,6 +36,16 @@ def test_a_saved_pose_is_a_label_here_and_in_the_file(session) -> None:
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_a_pose_is_taken_back_here_and_in_the_file(session) -> None:
+    before, frame = session.take.labels, free_frame(session)
+    session.save(frame, np.zeros(4))
+    assert session.saved_pose(frame).tolist() == [0.0] * 4
+    session.put(frame, None)
+    assert session.saved_pose(frame) is None
+    assert session.saved == 0
+    np.testing.assert_array_equal(facert.read_take(session.output).labels, before)
+
+
 def test_a_label_counts_only_once_it_is_written(session, tmp_path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("no folder")

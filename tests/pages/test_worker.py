@@ -23,6 +23,19 @@ def test_what_waits_under_one_key_is_done_once_with_the_newest() -> None:
     worker.stop()
 
 
+def test_order_is_kept_where_two_tasks_of_a_key_are_apart() -> None:
+    done: list[object] = []
+    gate = Event()
+    worker = Worker(done.append)
+    worker.do("gate", lambda: gate.wait(5.0) and None)
+    for key, value in (("save", 1), ("seek", 2), ("save", 3)):
+        worker.do(key, lambda value=value: done.append(value))
+    gate.set()
+    assert worker.finish()
+    assert done == [1, 2, 3]
+    worker.stop()
+
+
 def test_a_mistake_is_shown_and_the_next_task_is_done(caplog) -> None:
     shown: list[str] = []
     worker = Worker(shown.append)
