@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import json
+import math
 import re
 import unicodedata
-from collections.abc import Iterable
-from typing import NamedTuple
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+Read = TypeVar("Read")
+
+CLOCKS = ("time", "seconds", "time_s")
+
+
+class ScriptError(Exception):
+    """What a user can mend; its text is the message."""
 
 
 class Curves(NamedTuple):
@@ -28,10 +40,105 @@ class Key(NamedTuple):
     value: float
 
 
+class Pose(NamedTuple):
+    """The values of controls at a frame of a recording; seconds count from its first frame."""
+
+    frame: int
+    seconds: float
+    values: dict[str, float]
+
+
+class Timeline(NamedTuple):
+    """Which frame of a recording is when.
+
+    Of the frames whose seconds are known (frame and seconds, both rising) the nearest counts, and
+    the rate from there.
+    """
+
+    rate: float
+    known: Sequence[tuple[int, float]] = ((0, 0.0),)
+
+    def frame(self, seconds: float) -> int | None:
+        """The frame at a time, within half a frame; None where the recording has none."""
+        place = self._nearest([when for _, when in self.known], seconds)
+        frame, when = self.known[place]
+        found = frame + math.floor((seconds - when) * self.rate + 0.5)
+        before, after = self.known[max(0, place - 1)][0], self.known[place + 1 :][:1]
+        counted = found == frame or (
+            before < found or place == 0 if found < frame else not after or found < after[0][0]
+        )
+        return found if counted and found >= 0 else None
+
+    def seconds(self, frame: int) -> float:
+        """The time of a frame."""
+        known, when = self.known[self._nearest([frame for frame, _ in self.known], frame)]
+        return when + (frame - known) / self.rate
+
+    def _nearest(self, values: list[Any], value: float) -> int:
+        place = bisect_left(values, value)
+        around = range(max(0, place - 1), min(len(values), place + 1))
+        return min(around, key=lambda i: abs(values[i] - value))
+
+
 def read_curves(path: str) -> Curves:
-    """Read a .json or .csv that facert wrote."""
-    read = _read_json if path.lower().endswith(".json") else _read_csv
-    return read(path)
+    """Read a .json or .csv that facert wrote.
+
+    Raises `ScriptError` when the file is missing, or is none.
+    """
+    return _reading(path, _read_json if path.lower().endswith(".json") else _read_csv)
+
+
+def read_poses(path: str) -> list[tuple[int | None, float | None, dict[str, float]]]:
+    """Frame, seconds and values of the poses in a table, by its column frame or one of seconds.
+
+    Raises `ScriptError` when the file is missing, or is none.
+    """
+    if path.lower().endswith(".json"):
+        curves = read_curves(path)
+        frames: list[Any] = [None] * len(curves.time)
+        return _poses(frames, list(curves.time), curves.values)
+    return _reading(path, _read_pose_table)
+
+
+def read_suggestions(path: str) -> list[tuple[int, float | None]]:
+    """Frames, and their seconds where they are known, of ``facert suggest --json``, or of a list.
+
+    Raises `ScriptError` when the file is missing, or is none.
+    """
+    return _reading(path, _read_suggestions)
+
+
+def listed_frames(text: str) -> list[tuple[int, float | None]]:
+    """Frames in a text such as ``5,41,121``, or the whole of what ``facert suggest`` prints.
+
+    Raises `ScriptError` when there are none.
+    """
+    text = text.rsplit("in order of time:", 1)[-1].strip()
+    if not re.fullmatch(r"\d+(?:[\s,;]+\d+)*[\s,;]*", text):
+        raise ScriptError(f"expected frames such as 5,41,121, found {text[:40]!r}")
+    return [(int(number), None) for number in sorted(set(map(int, re.findall(r"\d+", text))))]
+
+
+def write_poses(path: str, poses: Sequence[Pose]) -> None:
+    """Write a table of poses that ``facert convert --poses`` reads; whole or not at all.
+
+    Raises `ScriptError` when there are none, or it cannot be written.
+    """
+    if not poses:
+        raise ScriptError("no pose to write")
+    names = list(dict.fromkeys(name for pose in poses for name in pose.values))
+    temporary = f"{path}.part"
+    try:
+        with open(temporary, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["frame", "seconds", *names])
+            for pose in poses:
+                values = [pose.values.get(name) for name in names]
+                cells = ["" if value is None else f"{value:.6g}" for value in values]
+                writer.writerow([pose.frame, f"{pose.seconds:.6f}", *cells])
+        Path(temporary).replace(path)
+    except OSError as error:
+        raise ScriptError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def keys(curves: Curves, name: str) -> list[Key]:
@@ -60,8 +167,41 @@ def find(name: str, there: Iterable[str]) -> str | None:
     return alike[0] if len(alike) == 1 else None
 
 
+def meant(name: str, there: Iterable[str]) -> str:
+    """The name, and the nearest of others where one is near."""
+    spellings = {spelling(other): other for other in there}
+    near = difflib.get_close_matches(spelling(name), spellings, 1, 0.7)
+    return f"{name!r} (did you mean {spellings[near[0]]!r}?)" if near else repr(name)
+
+
+def some(items: Sequence[str], most: int = 6) -> str:
+    """Some of the items, and how many more there are."""
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(item if len(item) < 60 else f"{item[:57]}..." for item in items[:most]) + more
+
+
+def plural(count: int, noun: str) -> str:
+    """A count with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def _side(found: re.Match[str]) -> str:
     return "left" if found.group().lower().endswith("l") else "right"
+
+
+def _reading(path: str, read: Callable[[str], Read]) -> Read:
+    """What a reader makes of a file; whatever it fails with is the file's fault."""
+    if not Path(path).is_file():
+        raise ScriptError(f"{path or 'no file'}: expected a file, found nothing")
+    try:
+        return read(path)
+    except ScriptError as error:
+        raise ScriptError(f"{path}: {error}") from error
+    except OSError as error:
+        raise ScriptError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+        text = f"{path}: expected a file that facert wrote, found something else ({error!r:.80})"
+        raise ScriptError(text) from error
 
 
 def _read_json(path: str) -> Curves:
@@ -69,19 +209,88 @@ def _read_json(path: str) -> Curves:
         document = json.load(file)
     rows, fps = document["weightMat"], float(document["exportFps"])
     time = document.get("time") or [row / fps for row in range(len(rows))]
-    columns = zip(*rows)
-    return Curves(fps, time, dict(zip(document["facsNames"], map(list, columns))))
+    names = document["facsNames"]
+    _require_widths(rows, len(names))
+    columns = map(list, zip(*rows))
+    return Curves(fps, time, dict(zip(names, columns)))
 
 
 def _read_csv(path: str) -> Curves:
+    header, rows = _table(path)
+    place = _place(header, CLOCKS[:1])
+    if place is None:
+        raise ScriptError(f"expected a column time, found {some(header)}: facert convert makes one")
+    time = [float(row[place]) for row in rows]
+    return Curves(_rate(time), time, _columns(header, rows, {place}))
+
+
+def _read_pose_table(path: str) -> list[tuple[int | None, float | None, dict[str, float]]]:
+    header, rows = _table(path)
+    stated = header[0].startswith("time (")
+    frame, clock = (None if stated else _place(header, ("frame",))), _place(header, CLOCKS)
+    if frame is None and clock is None:
+        raise ScriptError(f"expected a column frame or time, found {some(header)}")
+    frames = [None if frame is None else int(row[frame]) for row in rows]
+    times = [None if clock is None else float(row[clock]) for row in rows]
+    return _poses(frames, times, _columns(header, rows, {frame, clock}))
+
+
+def _read_suggestions(path: str) -> list[tuple[int, float | None]]:
+    with open(path, encoding="utf-8-sig") as file:
+        text = file.read()
+    if not text.lstrip().startswith("{"):
+        return listed_frames(text)
+    rows = json.loads(text)["frames"]
+    return sorted((int(row["frame"]), float(row["seconds"])) for row in rows)
+
+
+def _table(path: str) -> tuple[list[str], list[list[str]]]:
     with open(path, encoding="utf-8-sig", newline="") as file:
         header, *rows = [row for row in csv.reader(file) if row]
-    place = next(i for i, name in enumerate(header) if name.split(" (")[0] == "time")
-    time = [float(row[place]) for row in rows]
-    values = {
+    _require_widths(rows, len(header))
+    return header, rows
+
+
+def _require_widths(rows: Sequence[Sequence[Any]], width: int) -> None:
+    odd = next((i for i, row in enumerate(rows) if len(row) != width), None)
+    if odd is not None:
+        raise ScriptError(f"row {odd + 1}: expected {width} values, found {len(rows[odd])}")
+    if not rows:
+        raise ScriptError("expected rows of values, found none")
+
+
+def _place(header: Sequence[str], names: Sequence[str]) -> int | None:
+    """The column of one of these names; a first one that states its own is the time."""
+    if header[0].startswith("time ("):
+        return 0
+    lower = [name.strip().lower() for name in header]
+    return next((lower.index(name) for name in names if name in lower), None)
+
+
+def _columns(
+    header: Sequence[str], rows: Sequence[Sequence[str]], without: set[int | None]
+) -> dict[str, list[float | None]]:
+    return {
         name: [float(row[column]) if row[column] else None for row in rows]
         for column, name in enumerate(header)
-        if column != place
+        if column not in without
     }
+
+
+def _poses(
+    frames: Sequence[int | None],
+    times: Sequence[float | None],
+    columns: dict[str, list[float | None]],
+) -> list[tuple[int | None, float | None, dict[str, float]]]:
+    rows: list[dict[str, float]] = [{} for _ in frames]
+    for name, column in columns.items():
+        for row, value in zip(rows, column):
+            if value is not None:
+                row[name] = value
+    return list(zip(frames, times, rows))
+
+
+def _rate(time: Sequence[float]) -> float:
+    """Frames a second by the usual step."""
     steps = sorted(after - before for before, after in zip(time, time[1:]))
-    return Curves(1 / steps[len(steps) // 2] if steps else 30.0, time, values)
+    return 1 / steps[len(steps) // 2] if steps and steps[len(steps) // 2] > 0 else 30.0
