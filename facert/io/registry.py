@@ -178,6 +178,9 @@ FORMATS = (
     ),
 )
 
+_TEXT_MARKS = ("tables.csv_table.bears_mark", "curves.bears_mark", "importers.bears_mark")
+"""Of text that facert writes under whatever name it is given, such as a script as ``.txt``."""
+
 OWN_ENDINGS = FORMATS[0].endings
 """Of facert's own files, which keep all that a take has."""
 
@@ -225,8 +228,8 @@ def function(name: str) -> Callable[..., Any]:
 def is_foreign(path: Path) -> bool:
     """Whether there is a file of a format that facert reads or writes, and facert did not write it.
 
-    It is of a format by its ending or by its content, and facert's by the format's mark. An empty
-    file is nobody's; one that cannot be read is somebody's.
+    It is of a format by its ending or by its content, and facert's by the format's mark, or by that
+    of any text of facert's. An empty file is nobody's; one that cannot be read is somebody's.
     """
     if not path.is_file() or not path.stat().st_size:
         return False
@@ -235,7 +238,8 @@ def is_foreign(path: Path) -> bool:
     if not formats:
         return False
     with suppress(InputError), parsing("file", "one that bears a mark"):
-        return not any(function(one.mark)(path) for one in formats if one.mark)
+        marks = dict.fromkeys([*(one.mark for one in formats if one.mark), *_TEXT_MARKS])
+        return not any(function(mark)(path) for mark in marks)
     return True
 
 

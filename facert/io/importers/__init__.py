@@ -5,16 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from importlib.resources import files
+from pathlib import Path
 from pprint import pformat
 from typing import Any
 
+from facert.data.version import CREATED_BY, MARK
+from facert.io.guarded import read_beginning
+
 PROGRAMS = ("blender", "maya")
 ADDONS = ("blender",)
-MARK = "# facert export-script"
 
+_MARK = re.compile(rf'"""(?s:.*?)"""\n\n# {MARK}\S+ export-script\n'.encode())
 _FUTURE = "from __future__ import annotations\n"
 _SHARED = re.compile(r"^from facert\.io\.importers\.(\w+) import (?:\([^)]*\)|[^(\n]+)\n", re.M)
-_DRIVERS = re.compile(r"^(DRIVERS: .* =) \{\}", re.M)
+_DRIVERS = re.compile(r"^(DRIVERS: .* =) \{\}$", re.M)
 
 
 def script(program: str, addon: bool = False, drivers: Mapping[str, Any] | None = None) -> str:
@@ -27,7 +31,12 @@ def script(program: str, addon: bool = False, drivers: Mapping[str, Any] | None 
     if drivers:
         held = pformat(dict(drivers), sort_dicts=False, width=100)
         text = _DRIVERS.sub(lambda found: f"{found[1]} {held}", text, count=1)
-    return f"{text}\n{MARK}\n"
+    return text.replace('"""\n\n', f'"""\n\n# {CREATED_BY} export-script\n', 1)
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether a file is a script that `script` made."""
+    return _MARK.match(read_beginning(path)) is not None
 
 
 def _whole(module: str, there: set[str]) -> str:

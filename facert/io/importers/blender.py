@@ -22,7 +22,8 @@ from facert.io.importers.shared import ScriptError
 CURVES = ""  # e.g. "/shots/010/curves.json"
 OBJECT = ""  # the object with the shape keys; empty: all objects of the scene
 START = 1.0  # the frame of the first key
-DRIVERS: dict[str, Any] = {}  # as in drivers.toml; facert export-script --drivers puts it here
+# As in drivers.toml; facert export-script --drivers puts it here.
+DRIVERS: dict[str, Any] = {}
 
 
 def key_shapes(path: str, name: str = "") -> None:

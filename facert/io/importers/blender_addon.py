@@ -34,7 +34,8 @@ bl_info = {
     "category": "Animation",
 }
 
-DRIVERS: dict[str, Any] = {}  # as in drivers.toml; facert export-script --drivers puts it here
+# As in drivers.toml; facert export-script --drivers puts it here.
+DRIVERS: dict[str, Any] = {}
 _SCOPES = (
     ("ALL", "All objects", "Every object of the scene"),
     ("SELECTED", "Selected", "The selected objects, with all that belongs to their characters"),
@@ -263,6 +264,8 @@ def _objects(context: Any) -> list[Any]:
     if context.scene.facert.scope == "ALL":
         return everything
     roots = {_root(one) for one in everything if one.select_get()}
+    if not roots:
+        raise ScriptError("no object is selected: select the character, or choose all objects")
     return [one for one in everything if _root(one) in roots]
 
 

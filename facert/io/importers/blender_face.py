@@ -44,6 +44,13 @@ class Face:
                 found[name] = name
         return list(found)
 
+    @property
+    def names(self) -> list[str]:
+        """The names of the objects that have any of the controls."""
+        nodes = [self.node(place).id_data for place in self.places]
+        datas = [getattr(one.data, "shape_keys", None) for one in self.objects]
+        return [a.name for a, b in zip(self.objects, datas) if b in self.meshes or a in nodes]
+
     def blocks(self, control: str) -> list[Any]:
         """The shape keys of a control, in any spelling, one a mesh at most."""
         named = [(blocks, find(control, blocks)) for blocks in self.meshes.values()]

@@ -25,7 +25,8 @@ def key_controls(face: Face, points: Mapping[str, Points], anew: bool) -> list[s
     """
     absent = [c for c in points if not face.blocks(c) and find(c, face.motions) is None]
     if len(absent) == len(points):
-        theirs, ours = some(list(points)), some(face.controls)
+        ours = some(face.controls)
+        theirs = some([meant(name, face.controls) for name in absent])
         raise ScriptError(f"no shape key for {theirs}; those of the objects are {ours}")
     driven, beyond = [], []
     for control, found in points.items():

@@ -69,7 +69,7 @@ def import_curves(
     warnings = key_controls(face, points, anew=True)
     time = [second - curves.time[0] for second in curves.time]
     _keep(scene, Timeline(curves.fps, list(enumerate(time))))
-    names = some([one.name for one in face.objects], 4)
+    names = some(face.names, 4)
     at = f"{len(curves.time)} frames at {curves.fps:g} frames/s on {rate:g} frames/s"
     return Report(f"{at}, keyed on {names}", [*face.warnings, *warnings])
 
@@ -87,7 +87,9 @@ def export_poses(
     scene.frame_set(math.floor(start))  # where objects that were never keyed are at rest
     face = Face(objects, drivers)
     scene.frame_set(now)
-    frames = keyed_frames(face) if which == "KEYED" else _marked(scene, which == "SELECTED")
+    frames = keyed_frames(face)
+    if which != "KEYED":
+        frames = [_at_key(frame, frames) for frame in _marked(scene, which == "SELECTED")]
     if not frames:
         fix = "key the poses first" if which == "KEYED" else "set a marker at each pose first"
         raise ScriptError(f"no frame is {which.lower()}: {fix}")
@@ -108,7 +110,7 @@ def mark_frames(scene: Any, path: str, text: str, start: float) -> Report:
     found = listed_frames(text) if text.strip() else read_suggestions(path)
     known = [(frame, seconds) for frame, seconds in found if seconds is not None]
     if known:
-        _keep(scene, Timeline(_rate(known, scene_rate(scene)), known))
+        _keep(scene, Timeline(_usual_rate(known, scene_rate(scene)), known))
     line, rate = timeline_of(scene), scene_rate(scene)
     for marker in [m for m in scene.timeline_markers if m.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)
@@ -173,6 +175,12 @@ def _marked(scene: Any, selected: bool) -> list[float]:
     return sorted({float(marker.frame) for marker in markers})
 
 
+def _at_key(frame: float, keyed: Sequence[float]) -> float:
+    """The key that a marker is for, as markers stand on whole frames; else its frame."""
+    near = min(keyed, key=lambda key: abs(key - frame), default=frame)
+    return near if abs(near - frame) <= 0.5 else frame
+
+
 def _mark(scene: Any, frame: int | None, place: float) -> None:
     place = round(place)
     if not any(marker.frame == place for marker in scene.timeline_markers):
@@ -184,7 +192,7 @@ def _keep(scene: Any, line: Timeline) -> None:
     scene[TIMELINE] = json.dumps([line.rate, known])
 
 
-def _rate(known: Sequence[tuple[int, float]], otherwise: float) -> float:
+def _usual_rate(known: Sequence[tuple[int, float]], otherwise: float) -> float:
     """The usual rate between frames whose seconds are known."""
     rates = sorted(
         (frame - before) / (when - then)

@@ -134,7 +134,9 @@ def write_poses(path: str, poses: Sequence[Pose]) -> None:
             writer.writerow(["frame", "seconds", *names])
             for pose in poses:
                 values = [pose.values.get(name) for name in names]
-                cells = ["" if value is None else f"{value:.6g}" for value in values]
+                cells = [
+                    "" if value is None else f"{round(value, 6) + 0.0:.6g}" for value in values
+                ]
                 writer.writerow([pose.frame, f"{pose.seconds:.6f}", *cells])
         Path(temporary).replace(path)
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from dataclasses import replace
@@ -69,7 +70,21 @@ def test_a_script_needs_no_facert(program: str) -> None:
     assert text.startswith('"""Keys the ')
 
 
-# What the scripts ask of Maya and Blender, in Python alone: it keeps what is keyed.
+@pytest.mark.parametrize(("program", "addon"), [*((p, False) for p in PROGRAMS), ("blender", True)])
+def test_no_name_of_a_script_is_given_twice(program: str, addon: bool) -> None:
+    defined = [
+        name
+        for node in ast.parse(script(program, addon)).body
+        for name in (
+            [node.name]
+            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+            else [one.id for one in getattr(node, "targets", []) if isinstance(one, ast.Name)]
+        )
+    ]
+    assert sorted(defined) == sorted(set(defined))
+
+
+# What the script asks of Maya, in Python alone: it keeps what is keyed.
 MAYA = """
 import sys, types
 class cmds:
@@ -82,33 +97,6 @@ class cmds:
         cls.keyed.append((node, key["attribute"], key["time"], key["value"]))
 maya = types.ModuleType("maya"); maya.cmds = cmds
 sys.modules.update({"maya": maya, "maya.cmds": cmds})
-"""
-BLENDER = """
-import sys, types
-N = types.SimpleNamespace
-class Points(list):
-    def add(self, count): self += [N() for _ in range(count)]
-    def foreach_set(self, name, flat):
-        for point, co in zip(self, zip(flat[::2], flat[1::2])): point.co = co
-class Curves(dict):
-    def find(self, path): return self.get(path)
-class Block:
-    slider_min, slider_max, value = 0.0, 1.0, 0.0
-    def __init__(self, name): self.name = name
-    def path_from_id(self, path): return f'key_blocks["{self.name}"].{path}'
-    def keyframe_insert(self, path, frame):
-        new = N(keyframe_points=Points([N(co=(frame, self.value))]), update=lambda: None)
-        curves.setdefault(self.path_from_id(path), new)
-curves = Curves()
-blocks = {name: Block(name) for name in ("Basis", "jawopen", "eyeBlink.L", "smile")}
-action = N(fcurves=curves)
-if MODERN: action = N(layers=[N(strips=[N(channelbag={"slot": N(fcurves=curves)}.get)])])
-shapes = N(key_blocks=blocks, animation_data=N(action=action, action_slot="slot"))
-face = N(data=N(shape_keys=shapes))
-bpy = types.ModuleType("bpy")
-bpy.data = N(objects={"Face": face})
-bpy.context = N(active_object=face, scene=N(render=N(fps=50, fps_base=1.0)))
-sys.modules["bpy"] = bpy
 """
 
 
@@ -140,24 +128,3 @@ def test_maya_keys_attributes_by_time(folder: Path) -> None:
         ("face", "eyeBlinkLeft", "0.000000sec", 0.5),
     ]
     assert "no attribute for 'other.smile'" in printed
-
-
-@pytest.mark.parametrize("modern", [True, False])
-def test_blender_keys_shapes_by_time_at_the_rate_of_its_scene(folder: Path, modern: bool) -> None:
-    call = """key_shapes("curves.json", "Face")
-print({path: [point.co for point in one.keyframe_points] for path, one in curves.items()})"""
-    printed = run(
-        folder,
-        "from __future__ import annotations",
-        f"MODERN = {modern}",
-        BLENDER,
-        without_future("blender"),
-        call,
-    )
-    keyed: dict[str, list[Any]] = eval(printed.splitlines()[-1])
-    assert list(keyed) == ['key_blocks["jawopen"].value', 'key_blocks["eyeBlink.L"].value']
-    (first, last), (constant,) = keyed.values()
-    np.testing.assert_allclose(first, (1, 0.1))
-    np.testing.assert_allclose(last, (5, 0.3))
-    np.testing.assert_allclose(constant, (1, 0.5))
-    assert "no shape key for 'other.smile'" in printed
