@@ -7,20 +7,21 @@ with it, so that all parts are seen from the same side: their cameras are linked
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.take import Source
+from facert.mesh.caps import caps_of
 from facert.mesh.normals import vertex_normals
 from facert.pages.paint import LEVELS, MOST, Paint, skin
 from facert.render.faces import Face
-from facert.render.shade import frame_mesh
+from facert.render.shade import DARK, frame_mesh
 
 if TYPE_CHECKING:
-    from viser import CameraHandle, ClientHandle, ViserServer
+    from viser import CameraHandle, ClientHandle, MeshHandle, ViserServer
 
 ABOVE, BELOW = np.array([240.0, 242, 244]), np.array([196.0, 201, 207])  # the backdrop
 MARKER = (31, 111, 139)
@@ -31,6 +32,7 @@ FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 GAP = 0.08  # between two parts; each is 1 high or wide
 ASPECT = 1.2  # of the picture, width over height, until a browser reports it
 APRON = 0.004  # how deep, see `ColourLayer`
+BACK = 2.5  # of its own colour, the light that the inside needs to look as it does when rendered
 _POINT = 0.022
 _TURNED = 1e-3  # of the line across the view: less is not worth a message
 
@@ -88,6 +90,8 @@ def colour_layer(faces: IntArray, chosen: BoolArray) -> ColourLayer:
 class FacePart(Part):
     """A mesh that moves and is painted: a mesh for each colour, as a browser's has one.
 
+    Its inside, and what is seen through its holes, is dark, as `facert.render.shade` has it.
+
     Parameters
     ----------
     server : ViserServer
@@ -101,24 +105,21 @@ class FacePart(Part):
     def __init__(self, server: ViserServer, label: str, mesh: Mesh, own: Paint) -> None:
         super().__init__(server, label, mesh.vertices)
         self._faces, self._own = mesh.faces, own
+        self._caps = caps_of(mesh.vertices, mesh.faces)
         self._applied: Paint | None = None
         self._layers: list[ColourLayer] = []
-        self._meshes = [
-            server.scene.add_mesh_simple(
-                f"/{label}/colour{index}",
-                np.zeros((3, 3)),
-                np.array([[0, 1, 2]]),
-                side="double",
-                visible=False,
-            )
-            for index in range(max(MOST, LEVELS))
-        ]
+        shown = range(max(MOST, LEVELS))
+        self._meshes = [self._add_mesh(f"/{label}/colour{index}", "front") for index in shown]
+        self._inside = self._add_mesh(f"/{label}/inside", "back")
+        caps = self._caps.faces(len(mesh.vertices))
+        self._inside.faces = np.concatenate([mesh.faces, caps, caps[:, ::-1]]).astype(np.uint32)
+        self._inside.color = _bytes(BACK * DARK)
         self.draw(mesh.vertices)
 
     def draw(self, vertices: FloatArray, paint: Paint | None = None) -> None:
         """The mesh with these vertices (V, 3), in its own colours or others; NaN: no pose."""
         if not np.isfinite(vertices).all():
-            for mesh in self._meshes:
+            for mesh in (*self._meshes, self._inside):
                 mesh.visible = False
             self._applied = None
             return
@@ -130,6 +131,13 @@ class FacePart(Part):
                 if len(layer.faces):
                     chosen = np.where(layer.own[:, None], placed[layer.used], sunk[layer.used])
                     mesh.vertices = chosen.astype(np.float32)
+            closed = np.concatenate([placed, self._caps.middles(placed)])
+            self._inside.vertices, self._inside.visible = closed.astype(np.float32), True
+
+    def _add_mesh(self, name: str, side: Literal["front", "back"]) -> MeshHandle:
+        corner, triangle = np.zeros((3, 3)), np.array([[0, 1, 2]])
+        add = self._server.scene.add_mesh_simple
+        return add(name, corner, triangle, side=side, visible=False)
 
     def _apply_paint(self, paint: Paint) -> None:
         """Show the mesh in these colours: one layer of triangles for each."""
@@ -144,8 +152,7 @@ class FacePart(Part):
             mesh.visible = used
             if used:
                 mesh.faces = self._layers[index].faces.astype(np.uint32)
-                red, green, blue = np.rint(255 * paint.palette[index]).astype(int).tolist()
-                mesh.color = (red, green, blue)
+                mesh.color = _bytes(paint.palette[index])
 
 
 class MarkerPart(Part):
@@ -283,6 +290,11 @@ def face_part(server: ViserServer, face: Face, own: Paint | None = None) -> Face
     """The part of a face, in its own colours (see `skin`) unless others are given."""
     neutral = face.motion.neutral
     return FacePart(server, face.label, neutral, own or skin(neutral))
+
+
+def _bytes(colour: FloatArray) -> tuple[int, int, int]:
+    red, green, blue = np.rint(255 * colour).astype(int).tolist()
+    return red, green, blue
 
 
 def _light(server: ViserServer) -> None:
