@@ -9,10 +9,11 @@ in turns about one axis between the two, as eyes do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from facert.data.names import NameIndex, nearest
 from facert.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -114,6 +115,21 @@ class Drivers:
             control: [one.table() for one in self.entries if one.control == control]
             for control in self.controls
         }
+
+
+def require_used(drivers: Sequence[str], controls: Sequence[str]) -> None:
+    """Check that each control with a driver is one of a take's controls, in any spelling.
+
+    Raises `InputError` for the first that is not, with the nearest one that is.
+    """
+    index = NameIndex.among(controls, drivers, "--drivers", halves=True, quiet=True)
+    lost = next((one for one in drivers if not index.find_halves(one)), None)
+    if lost is not None:
+        near = nearest(lost, controls)
+        hint = f"Did you mean {near!r}? " if near else ""
+        fix = f"{hint}Correct the table, or leave it out."
+        found = f"none among {len(controls)}"
+        raise InputError("--drivers", f"a control {lost!r} in the take", found, fix)
 
 
 def _of_control(control: str, held: Any) -> Iterator[Driver]:

@@ -10,7 +10,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray, checked_names
 from facert.data.names import NameIndex, match
 from facert.data.resampling import nearest_frames
-from facert.data.rig import Rig
+from facert.data.rig import Shaped
 from facert.data.take import Controls, Take, named_curves
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -165,7 +165,7 @@ def poses_of(take: Take) -> Poses:
     return Poses(names, values, take.time, limits=limits)
 
 
-def weights_as_poses(take: Take, rig: Rig) -> Take:
+def weights_as_poses(take: Take, rig: Shaped) -> Take:
     """The take with its tracked weights as the poses of a rig that has shapes of their names.
 
     Weights without a shape are left out, and the log names them. A frame with a weight that was

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -107,6 +108,14 @@ class MeshSequence:
         """Iterate over the frames in order as vertices (n, V, 3), at most `size` at once."""
         for start in range(0, len(self), size):
             yield self.fetch(np.arange(start, min(start + size, len(self))))
+
+
+class Shaped(Protocol):
+    """A character whose controls have names: a rig, or a file of one."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The controls."""
 
 
 @dataclass(frozen=True, eq=False)

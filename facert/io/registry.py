@@ -184,6 +184,9 @@ _TEXT_MARKS = ("tables.csv_table.bears_mark", "curves.bears_mark", "importers.be
 OWN_ENDINGS = FORMATS[0].endings
 """Of facert's own files, which keep all that a take has."""
 
+GLTF_ENDINGS = (".glb", ".gltf", ".vrm")
+"""Of glTF files, which a .glb keeps as they are."""
+
 _ADVICE = {
     ".fbx": "Export it as .glb from Blender, Maya or Unreal.",
     ".bvh": "Export it as .c3d or .trc.",

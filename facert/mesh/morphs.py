@@ -11,7 +11,7 @@ batches, so that memory does not grow with their number.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class Morphs:
 
 
 def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0) -> Morphs:
-    """A rig's own shapes, without those that stay at 0.
+    """A rig's own shapes, also those that stay at 0.
 
     Rows of NaN in `params` (T, P), frames without a pose, are left out.
 
@@ -51,11 +51,16 @@ def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0
     posed = ~np.isnan(params).any(axis=1)
     if not posed.any():
         raise InputError("/target/params", "a pose", "none", "Retarget the take first.")
-    moving = np.flatnonzero(np.any(params[posed] != 0, axis=0))
+    return Morphs(rig.mesh, rig.shapes, rig.names, params[posed], time[posed], fps=fps)
+
+
+def moving_morphs(morphs: Morphs) -> Morphs:
+    """Those targets whose weights do not stay at 0; the first where all do."""
+    moving = np.flatnonzero(np.any(morphs.weights != 0, axis=0))
     moving = moving if len(moving) else np.arange(1)
-    names = tuple(rig.names[index] for index in moving)
-    weights = params[np.ix_(posed, moving)]
-    return Morphs(rig.mesh, rig.shapes[moving], names, weights, time[posed], fps=fps)
+    names = tuple(morphs.names[index] for index in moving)
+    weights, targets = morphs.weights[:, moving], morphs.targets[moving]
+    return replace(morphs, targets=targets, names=names, weights=weights)
 
 
 def compact_morphs(sequence: MeshSequence, tolerance: float = TOLERANCE, seed: int = 0) -> Morphs:

@@ -49,10 +49,10 @@ def test_a_mesh_sequence_becomes_a_glb(facert, folder: Path) -> None:
     assert trimesh.load_scene(folder / "face.glb").extents[0] == pytest.approx(0.02)
 
 
-def test_a_take_becomes_a_glb_of_the_shapes_that_it_moves(facert, folder: Path) -> None:
+def test_a_take_becomes_a_glb_of_all_shapes(facert, folder: Path) -> None:
     outcome = facert("convert", folder / "take.h5", folder / "a.glb", "--rig", folder / "rig.h5")
-    assert "24 frames of 1 morph target" in outcome.out
-    assert b'"targetNames":["up"]' in (folder / "a.glb").read_bytes()
+    assert "24 frames of 2 morph targets" in outcome.out
+    assert b'"targetNames":["up","away"]' in (folder / "a.glb").read_bytes()
 
 
 def test_a_take_becomes_usd(facert, folder: Path) -> None:
@@ -77,7 +77,7 @@ def test_an_animated_glb_is_a_rig_or_a_take(facert, folder: Path) -> None:
     facert("convert", folder / "take.h5", glb, "--rig", folder / "rig.h5")
     assert "a rig" in facert("convert", glb, folder / "b.h5").out
     assert "a take" in facert("convert", glb, folder / "c.h5", "--kind", "take").out
-    assert "24 frames of 1 weight" in facert("convert", glb, folder / "c.json").out
+    assert "24 frames of 2 weights" in facert("convert", glb, folder / "c.json").out
     assert "24 frames" in facert("convert", glb, folder / "d.glb", "--rig", glb).out
 
 
@@ -85,7 +85,7 @@ def test_tracked_weights_move_a_rig_of_their_names(facert, folder: Path) -> None
     (folder / "face.csv").write_text("time,Up,headYaw\n0,0.5,9\n0.1,,9\n0.2,1,9\n")
     arguments = ("convert", folder / "face.csv", folder / "e.glb", "--rig", folder / "rig.h5")
     done = facert(*arguments)
-    assert "2 frames of 1 morph target" in done.out
+    assert "2 frames of 2 morph targets" in done.out
     assert "no shape for 1 weight, left out: headYaw" in done.err
 
 

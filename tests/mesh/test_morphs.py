@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from facert.data.rig import Mesh, MeshSequence, Rig
 from facert.errors import InputError
-from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
+from facert.mesh.morphs import Morphs, compact_morphs, moving_morphs, rig_morphs
 
 RNG = np.random.default_rng(0)
 MESH = Mesh(RNG.normal(size=(40, 3)), np.array([[0, 1, 2]]), "cm")
@@ -75,10 +75,12 @@ def test_a_mesh_that_rests_has_targets_that_do_nothing() -> None:
     np.testing.assert_array_equal(played(morphs), np.tile(MESH.vertices, (5, 1, 1)))
 
 
-def test_a_rig_keeps_its_shapes_without_those_that_rest() -> None:
+def test_a_rig_keeps_its_shapes_and_those_that_rest_can_be_left_out() -> None:
     rig = Rig(MESH.vertices, RNG.normal(size=(3, 40, 3)), ("a", "b", "c"), MESH.faces)
     params = np.array([[0.5, 0, 1], [np.nan] * 3, [0.25, 0, 0]])
     morphs = rig_morphs(rig, params, np.array([0.0, 0.1, 0.2]))
+    assert morphs.names == ("a", "b", "c")
+    morphs = moving_morphs(morphs)
     assert morphs.names == ("a", "c")
     np.testing.assert_array_equal(morphs.time, [0, 0.2])
     np.testing.assert_allclose(played(morphs), rig.deform(params[[0, 2]]), atol=1e-12)

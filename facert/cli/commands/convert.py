@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from facert.cli.shared.batch import carry_out, plan
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
+    DRIVERS,
     ENDING,
     JOBS,
     OUT_DIR,
@@ -77,6 +78,7 @@ def command(
         option("Move, turn and scale .obj that are not in register with neutral.obj."),
     ] = False,
     rig_path: RIG = None,
+    drivers_path: DRIVERS = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
     jobs: JOBS = None,
@@ -88,8 +90,9 @@ def command(
     or a flag are used as such, or left out and named, unless --keep names them. Rows without a face
     are dropped and counted.
     A .csv or .json holds the poses when there are any, else the source. A .glb or .usd holds the
-    shapes of the rig that a take moves, or the few morph targets that move a mesh as its sequence
-    does. What IN does not state of its rate, unit or axis is taken to be as OUT's.
+    rig that a take moves, or the few morph targets that move a mesh as its sequence does; a .glb of
+    a character in a .glb, .gltf or .vrm is that file as it is, with the animation added. What IN
+    does not state of its rate, unit or axis is taken to be as OUT's.
 
     facert convert retargeted.h5 curves.csv
     facert convert retargeted.h5 face.glb --rig facert-demo/character.h5
@@ -97,9 +100,9 @@ def command(
     from facert.cli.shared.conversion import KINDS, Wanted, convert_file
     from facert.data.changes import Changes
     from facert.io.poses import read_poses
-    from facert.io.toml import read_toml
+    from facert.io.toml import read_drivers, read_toml
 
-    others = (map_path, poses_path, rig_path)
+    others = (map_path, poses_path, rig_path, drivers_path)
     require_inputs(*others)
     todo = plan(paths, out_dir, ending, jobs, overwrite, KINDS, others)
     changes = Changes(
@@ -112,6 +115,9 @@ def command(
         up_axis=up_axis,
         start_timecode=start_timecode,
     )
-    wanted = Wanted(kind, target, shapes, in_fps, fps, rig_path, tuple(keep or ()), align_shapes)
+    drivers = read_drivers(drivers_path) if drivers_path else None
+    wanted = Wanted(
+        *(kind, target, shapes, in_fps, fps, rig_path, drivers), tuple(keep or ()), align_shapes
+    )
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

@@ -10,16 +10,27 @@ import numpy as np
 from facert.cli.shared import console
 from facert.cli.shared.files import warn_of_unit
 from facert.data.changes import Changes, converted, in_space
+from facert.data.drivers import Drivers
 from facert.data.labelling import weights_as_poses
-from facert.data.rig import Rig
+from facert.data.rig import Rig, Shaped
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io import formats
+from facert.io.gltf.carried import CarriedFile
+from facert.io.gltf.character import Character
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
-from facert.io.registry import OWN_ENDINGS, Kind, output_format, require_output, write
-from facert.mesh.morphs import Morphs, compact_morphs, rig_morphs
-from facert.render.faces import control_settings
+from facert.io.registry import (
+    GLTF_ENDINGS,
+    OWN_ENDINGS,
+    Kind,
+    format_of,
+    output_format,
+    require_output,
+    write,
+)
+from facert.mesh.morphs import Morphs, compact_morphs, moving_morphs, rig_morphs
+from facert.render.faces import control_settings, require_poses
 
 KINDS: tuple[Kind, ...] = ("take", "rig", "morphs")
 """What a file can be converted to."""
@@ -35,6 +46,7 @@ class Wanted:
     fps: float | None = None
     or_fps: float | None = None
     rig: Path | None = None
+    drivers: Drivers | None = None
     keep: tuple[str, ...] = ()
     align: bool = False
 
@@ -57,15 +69,18 @@ def convert_file(
 def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overwrite: bool) -> str:
     of_morphs = "morphs" in require_output(output, overwrite, *KINDS).write
     if holds_mesh_sequence(source):
-        plain = changes == Changes() and not wanted.fps
-        return _convert_sequence(source, output, plain, overwrite)
+        return _convert_sequence(source, output, _is_plain(wanted, changes), overwrite)
+    if _is_copy(source, output, wanted, changes):
+        with reading(source):
+            CarriedFile(source).write(output, overwrite)
+        return f"the character as in {source.name}"
     found = _read(source, output, wanted, changes)
     with reading(source):
         found = converted(found, changes)
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
         if of_morphs:
-            return _write_motion(_motion(found, wanted, changes), output, overwrite)
+            return _write_moved(found, output, wanted, changes, overwrite)
     count = formats.write_take_file(found, output, overwrite)
     return _content(found, count, output)
 
@@ -102,21 +117,64 @@ def _convert_sequence(source: Path, output: Path, plain: bool, overwrite: bool) 
     return _write_motion(morphs, output, overwrite)
 
 
-def _motion(take: Take, wanted: Wanted, changes: Changes) -> Morphs:
-    """The rig in the poses of a take, or as its tracked weights move it."""
+def _is_plain(wanted: Wanted, changes: Changes) -> bool:
+    """Whether nothing is to be changed."""
+    return changes == Changes() and not wanted.fps
+
+
+def _is_copy(source: Path, output: Path, wanted: Wanted, changes: Changes) -> bool:
+    """Whether a character alone is asked for, and as it is."""
+    other = wanted.kind == "take" or wanted.rig or wanted.shapes
+    return not other and _is_plain(wanted, changes) and _is_carried(source, output)
+
+
+def _is_carried(character: Path, output: Path) -> bool:
+    """Whether a character's file is of the output's own format, so that it stays as it is."""
+    found = format_of(character, "read", "rig")
+    of_gltf = found is not None and set(found.endings) <= set(GLTF_ENDINGS)
+    return of_gltf and output.suffix.lower() == ".glb"
+
+
+def _write_moved(
+    take: Take, output: Path, wanted: Wanted, changes: Changes, overwrite: bool
+) -> str:
+    """Write a character in the poses of a take, or as its tracked weights move it."""
     if wanted.rig is None:
         raise InputError("--rig", "the character's rig", "none", "Give it with --rig.")
-    with reading(wanted.rig):
-        rig = formats.read_rig_file(wanted.rig, wanted.shapes)
+    if _is_carried(wanted.rig, output):
+        with reading(wanted.rig):
+            character = Character(wanted.rig, wanted.shapes, wanted.drivers)
+        posed = _posed(take, character)
+        poses, controls = require_poses(posed), posed.controls
+        assert controls is not None  # poses come with controls
+        return character.write(controls.names, poses, posed.time, output, overwrite)
+    if wanted.drivers is not None:
+        fix = "Leave it out: other files show shapes alone."
+        raise InputError("--drivers", ".glb from a .glb, .gltf or .vrm", output.name, fix)
+    morphs = _motion(take, wanted.rig, wanted, changes)
+    morphs = morphs if output.suffix.lower() == ".glb" else moving_morphs(morphs)
+    return _write_motion(morphs, output, overwrite)
+
+
+def _motion(take: Take, path: Path, wanted: Wanted, changes: Changes) -> Morphs:
+    """The rig in the poses of a take."""
+    with reading(path):
+        rig = formats.read_rig_file(path, wanted.shapes)
         # `--in-units` is the unit of IN: a rig that states its own unit keeps that, and in any case
         # its own up axis.
         stated = rig.units or changes.in_units
         in_unit = in_space(rig, Changes(in_units=stated, units=changes.units))
     assert isinstance(in_unit, Rig)  # as it went in
-    if not len(take.labels) and take.source.kind == "weights":
-        take = weights_as_poses(take, in_unit)
+    take = _posed(take, in_unit)
     settings = control_settings(take, in_unit, range(len(take)))
     return rig_morphs(in_unit, settings, take.time, take.fps)
+
+
+def _posed(take: Take, rig: Shaped) -> Take:
+    """The take; of one with tracked weights and no poses, those as poses."""
+    if not len(take.labels) and take.source.kind == "weights":
+        return weights_as_poses(take, rig)
+    return take
 
 
 def _write_rig(rig: Rig, output: Path, overwrite: bool) -> str:

@@ -64,6 +64,10 @@ SHAPES = Annotated[
     ),
 ]
 RIG = Annotated[Path | None, file_option("The character's rig.", "--rig")]
+DRIVERS = Annotated[
+    Path | None,
+    file_option("Controls that move bones or objects of the rig.", "--drivers", metavar="TOML"),
+]
 TRUTH = Annotated[Path | None, file_option("The true poses of the same frames.", "--truth")]
 ACTOR = Annotated[Path | None, file_option("The actor's rig, to draw tracked weights.", "--actor")]
 CONTROLS = Annotated[

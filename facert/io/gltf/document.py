@@ -8,16 +8,12 @@ be compressed (``EXT_meshopt_compression``), numbers quantised (``KHR_mesh_quant
 
 from __future__ import annotations
 
-import base64
-import binascii
 import re
-import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +21,16 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.version import MARK
 from facert.errors import InputError, reading
-from facert.io.curves import parse_json_object
 from facert.io.gltf.compression import MESHOPT, decompressed
-from facert.io.guarded import moderate_file, parsing, read_beginning
+from facert.io.gltf.container import read_container
+from facert.io.guarded import parsing, read_beginning
 
 MAX_VALUES = 2**27
 """Most numbers of one array: 1 GiB of float64."""
 
-_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _DRACO = "KHR_draco_mesh_compression"
-_EMBEDDED = ";base64,"
 _GENERATOR = re.compile(rf'"generator"\s*:\s*"{MARK}'.encode())
 
 
@@ -131,17 +125,11 @@ def bears_mark(path: Path) -> bool:
 
 
 def _document(path: Path) -> Document:
-    content = moderate_file(path).read_bytes()
-    binary = content[:4] == struct.pack("<I", _MAGIC)
-    text, own = _chunks(content) if binary else (content, None)
-    root = parse_json_object(text)
-    if not str(root["asset"]["version"]).startswith("2"):
-        raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
-    if _needs_draco(root):
+    container = read_container(path)
+    if _needs_draco(container.root):
         fix = "Export it without Compression, or: npx gltf-pipeline -i IN.glb -o PLAIN.glb"
         raise InputError("extensionsRequired", "no Draco compression", _DRACO, fix)
-    buffers = enumerate(root.get("buffers", []))
-    return Document(root, [_buffer(one, path.parent, own, i) for i, one in buffers])
+    return Document(container.root, container.buffers())
 
 
 def _needs_draco(root: dict[str, Any]) -> bool:
@@ -155,40 +143,6 @@ def _needs_draco(root: dict[str, Any]) -> bool:
     return _DRACO in root.get("extensionsRequired", []) or any(
         "bufferView" not in root["accessors"][_index(accessor)] for accessor in packed
     )
-
-
-def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
-    """The JSON and the binary chunk of a GLB file."""
-    try:
-        _, version, total, length, kind = struct.unpack_from("<IIIII", content)
-        rest = content[20 + length : total]
-        if version != 2 or kind != _JSON or total > len(content) or 20 + length > total:
-            raise ValueError
-        size, other = struct.unpack_from("<II", rest) if len(rest) >= 8 else (0, 0)
-    except (struct.error, ValueError):
-        expected, found = "a whole GLB file of version 2", "another or a truncated one"
-        raise InputError("file", expected, found, "Export it again.") from None
-    return content[20 : 20 + length], rest[8 : 8 + size] if other == _BINARY else None
-
-
-def _buffer(buffer: dict[str, Any], folder: Path, own: bytes | None, number: int) -> bytes:
-    """Bytes of a buffer, from the file's own chunk, the URI, or a file beside it."""
-    if any(name in buffer.get("extensions", {}) for name in MESHOPT):
-        return b""  # for programs that cannot decompress: it may be absent
-    uri = buffer.get("uri")
-    if uri is None and number == 0 and own is not None:
-        return own
-    if isinstance(uri, str) and uri.startswith("data:") and _EMBEDDED in uri:
-        try:
-            return base64.b64decode(uri.partition(_EMBEDDED)[2], validate=True)
-        except binascii.Error as error:
-            raise ValueError(f"a buffer: {error}") from error
-    name = unquote(uri) if isinstance(uri, str) else ""
-    if not name or name != Path(name).name or "\\" in name or ":" in name or name == "..":
-        raise InputError(
-            "buffers", "data in the file or beside it", f"{uri!r}", "Export it as one .glb file."
-        )
-    return moderate_file(folder / name).read_bytes()
 
 
 def _index(value: Any) -> int:

@@ -22,7 +22,7 @@ from facert.errors import InputError
 from facert.io.gltf.document import MAX_VALUES, Document, open_gltf
 from facert.io.gltf.names import target_names
 from facert.io.gltf.scene import Scene, displaced, mirrored, scene_of, transformed
-from facert.io.gltf.vrm import Bind, expressions_of, looks_back
+from facert.io.gltf.vrm import Bind, expressions_of, looks_back, target_weights
 
 log = logging.getLogger("facert")
 
@@ -76,7 +76,7 @@ def read_gltf_rig(path: Path, shapes: str | None = None) -> Rig:
         names = target_names(document)
         parts = [_part(scene, one, names[one.mesh]) for one in there]
         _log_default_weights(document, there, names)
-        expressions = _expressions(document, shapes)
+        expressions = expressions_by_name(document, shapes)
         if shapes == EXPRESSIONS:
             pairs = zip(parts, there, strict=True)
             parts = [_expressed(part, one.mesh, expressions) for part, one in pairs]
@@ -160,7 +160,7 @@ def _log_default_weights(
         log.info("the file shows the mesh with %s: the neutral is without", printable(listed, 200))
 
 
-def _expressions(document: Document, shapes: str | None) -> dict[str, list[Bind]]:
+def expressions_by_name(document: Document, shapes: str | None) -> dict[str, list[Bind]]:
     """The expressions of an avatar, which the log lists.
 
     Raises `InputError` when `shapes` are none of what there is.
@@ -182,11 +182,7 @@ def _expressions(document: Document, shapes: str | None) -> dict[str, list[Bind]
 def _expressed(part: _PlacedMesh, mesh: int, expressions: dict[str, list[Bind]]) -> _PlacedMesh:
     """The part with expressions for targets: sums of those that they set."""
     _require_moderate(len(expressions), len(part.vertices))
-    weights = np.zeros((len(expressions), len(part.targets)))
-    for row, binds in zip(weights, expressions.values(), strict=True):
-        for bind in binds:
-            if bind.mesh == mesh:
-                row[bind.target] += bind.weight
+    weights = target_weights(expressions, mesh, len(part.targets))
     return replace(
         part, targets=np.tensordot(weights, part.targets, axes=1), names=tuple(expressions)
     )

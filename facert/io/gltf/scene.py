@@ -7,13 +7,13 @@ does not count. Exporters put units, axes and quantisation into any of these mat
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.io.gltf.document import MAX_VALUES, Document
 
 MAX_SETS = 8
@@ -31,11 +31,14 @@ class Scene:
         Those of the scene, each once, a node before its children.
     worlds : dict of arrays, shape (4, 4)
         From each node's space to the scene's, also of those outside of it, as joints may be.
+    parents : dict of int
+        The node above each that has one, by their numbers.
     """
 
     document: Document
     nodes: tuple[int, ...]
     worlds: dict[int, FloatArray]
+    parents: dict[int, int]
 
     def placement(self, node: int, attributes: dict[str, Any]) -> FloatArray:
         """Transforms of a mesh's vertices to the scene's space, (V, 4, 4); (1, 4, 4) of all alike.
@@ -56,8 +59,44 @@ class Scene:
         inverse = self.document.numbers(described["inverseBindMatrices"])[: len(worlds)]
         return np.asarray(worlds @ inverse.reshape(len(worlds), 4, 4).transpose(0, 2, 1))
 
+    def shares(
+        self, node: int, attributes: dict[str, Any], driven: Sequence[int]
+    ) -> FloatArray | None:
+        """How far a mesh's vertices follow each of some nodes, or what is below it, (V, N).
+
+        None where all follow the nearest of them above the mesh alike, see `above`.
+        """
+        skin = self.document.root["nodes"][node].get("skin")
+        if skin is None or "JOINTS_0" not in attributes:
+            return None
+        joint, share = self._ties(attributes)
+        followed = [self.above(one, driven) for one in self.document.root["skins"][skin]["joints"]]
+        found = np.zeros((len(joint), len(driven)))
+        for number in range(len(driven)):
+            found[:, number] = (share * (np.array(followed)[joint] == number)).sum(axis=1)
+        return found
+
+    def above(self, node: int, driven: Sequence[int]) -> int:
+        """Position of the nearest of some nodes that is this one or above it; -1 for none."""
+        places = {one: place for place, one in enumerate(driven)}
+        while node not in places and node in self.parents:
+            node = self.parents[node]
+        return places.get(node, -1)
+
     def _blended(self, matrices: FloatArray, attributes: dict[str, Any]) -> FloatArray:
         """Weighted means of joints' matrices, (V, 4, 4); all of the first joint without weights."""
+        joint, share = self._ties(attributes)
+        blended = np.zeros((len(joint), 4, 4))
+        for column in range(joint.shape[1]):
+            used = share[:, column] != 0
+            blended[used] += share[used, column, None, None] * matrices[joint[used, column]]
+        return blended
+
+    def _ties(self, attributes: dict[str, Any]) -> tuple[IntArray, FloatArray]:
+        """The joints of each vertex, and how far it follows them, (V, n) each; the shares add to 1.
+
+        Where a share is 0, the joint is the first, as the file may have any number there.
+        """
         joints, weights = [], []
         for number in range(MAX_SETS):
             if f"JOINTS_{number}" not in attributes:
@@ -72,11 +111,7 @@ class Scene:
         weight = np.maximum(weight, 0.0)  # below 0 by rounding
         weight[weight.sum(axis=1) == 0, 0] = 1.0
         share = weight / weight.sum(axis=1, keepdims=True)
-        blended = np.zeros((len(joint), 4, 4))
-        for column in range(joint.shape[1]):
-            used = share[:, column] != 0  # a joint without weight may be any number
-            blended[used] += share[used, column, None, None] * matrices[joint[used, column]]
-        return blended
+        return np.where(share != 0, joint, 0), share
 
 
 def scene_of(document: Document) -> Scene:
@@ -86,10 +121,11 @@ def scene_of(document: Document) -> Scene:
     tops = [index for index in range(len(nodes)) if index not in below]
     scenes = document.root.get("scenes") or [{"nodes": tops}]
     worlds: dict[int, FloatArray] = {}
-    shown = tuple(_walk(nodes, scenes[document.root.get("scene", 0)]["nodes"], worlds))
+    parents: dict[int, int] = {}
+    shown = tuple(_walk(nodes, scenes[document.root.get("scene", 0)]["nodes"], worlds, parents))
     for starts in (tops, range(len(nodes))):  # the latter for circles, which nothing leads to
-        list(_walk(nodes, starts, worlds))
-    return Scene(document, shown, worlds)
+        list(_walk(nodes, starts, worlds, parents))
+    return Scene(document, shown, worlds, parents)
 
 
 def transformed(vertices: FloatArray, placement: FloatArray) -> FloatArray:
@@ -109,27 +145,45 @@ def mirrored(placement: FloatArray) -> bool:
     return bool(np.median(np.linalg.det(placement[:, :3, :3])) < 0)
 
 
-def _walk(nodes: Any, starts: Any, worlds: dict[int, FloatArray]) -> Iterator[int]:
-    """Iterate over the nodes below some, each node once, and find their transforms."""
-    waiting = [(index, np.eye(4)) for index in reversed(starts)]
+def _walk(
+    nodes: Any, starts: Any, worlds: dict[int, FloatArray], parents: dict[int, int]
+) -> Iterator[int]:
+    """Iterate over the nodes below some, each node once; find their transforms and parents."""
+    waiting = [(index, np.eye(4), -1) for index in reversed(starts)]
     while waiting:
-        index, above = waiting.pop()
+        index, world, parent = waiting.pop()
         if index in worlds:
             continue
-        worlds[index] = above @ _local(nodes[index])
+        if parent >= 0:
+            parents[index] = parent  # the way that was gone: there are no circles in it
+        worlds[index] = world @ placed(*local_parts(nodes[index]))
         yield index
         children = reversed(nodes[index].get("children", []))
-        waiting += [(child, worlds[index]) for child in children]
+        waiting += [(child, worlds[index], index) for child in children]
 
 
-def _local(node: dict[str, Any]) -> FloatArray:
-    """A node's own transform, (4, 4)."""
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+def local_parts(node: dict[str, Any]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A node's own translation (3,), rotation matrix (3, 3) and what is within, (3, 3): its scale.
+
+    Of a node with a matrix the rotation is that of its columns, and the rest, shear as well, is
+    within.
+    """
     from scipy.spatial.transform import Rotation  # takes its time
 
-    local = np.eye(4)
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        scale = np.linalg.norm(matrix[:3, :3], axis=0)
+        scale[0] *= -1.0 if np.linalg.det(matrix[:3, :3]) < 0 else 1.0
+        whole = scale.all()
+        turn = matrix[:3, :3] / scale if whole else np.eye(3)
+        return matrix[:3, 3], turn, np.diag(scale) if whole else matrix[:3, :3]
     turn = Rotation.from_quat(node.get("rotation", [0.0, 0.0, 0.0, 1.0])).as_matrix()
-    local[:3, :3] = turn * np.array(node.get("scale", [1.0] * 3), dtype=np.float64)
-    local[:3, 3] = node.get("translation", [0.0] * 3)
+    scale = np.array(node.get("scale", [1.0] * 3), dtype=np.float64)
+    return np.array(node.get("translation", [0.0] * 3), dtype=np.float64), turn, np.diag(scale)
+
+
+def placed(translation: FloatArray, turn: FloatArray, within: FloatArray) -> FloatArray:
+    """The transform (4, 4) of these parts, see `local_parts`."""
+    local = np.eye(4)
+    local[:3, :3], local[:3, 3] = turn @ within, translation
     return local

@@ -14,6 +14,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from facert.data.arrays import FloatArray
+
 _FULL = 100.0
 _UNKNOWN = "unknown"
 
@@ -50,6 +54,16 @@ def expressions_of(root: dict[str, Any]) -> dict[str, list[Bind]]:
     return expressions
 
 
+def target_weights(expressions: dict[str, list[Bind]], mesh: int, count: int) -> FloatArray:
+    """How far expressions, K of them, set the targets of a mesh, (K, count)."""
+    weights = np.zeros((len(expressions), count))
+    for row, binds in zip(weights, expressions.values(), strict=True):
+        for bind in binds:
+            if bind.mesh == mesh:
+                row[bind.target] += bind.weight
+    return weights
+
+
 def looks_back(root: dict[str, Any]) -> bool:
     """Whether the avatar looks along -z, as those of VRM 0 do, unlike other glTF files."""
     extensions = root.get("extensions", {})
@@ -68,6 +82,19 @@ def animated_expressions(root: dict[str, Any]) -> dict[int, str]:
     kinds = animation.get("expressions", {})
     found = {kind: kinds.get(kind) or {} for kind in ("preset", "custom")}
     return {one["node"]: name for some in found.values() for name, one in some.items()}
+
+
+def material_expressions(root: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the expressions that do something to materials, which is left aside."""
+    extensions = root.get("extensions", {})
+    groups = extensions.get("VRM", {}).get("blendShapeMaster", {}).get("blendShapeGroups", [])
+    found = [str(one.get("name")) for one in groups if one.get("materialValues")]
+    kinds = extensions.get("VRMC_vrm", {}).get("expressions", {})
+    for kind in ("preset", "custom"):
+        for name, one in (kinds.get(kind) or {}).items():
+            if one.get("materialColorBinds") or one.get("textureTransformBinds"):
+                found.append(str(name))
+    return tuple(found)
 
 
 def _of_version_0(vrm: dict[str, Any]) -> Iterator[tuple[str, list[Bind]]]:

@@ -7,68 +7,19 @@ Blender, Maya, Unreal and web viewers read the targets' names from the mesh's ``
 
 from __future__ import annotations
 
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.units import in_metres
 from facert.data.version import CREATED_BY
 from facert.errors import InputError
-from facert.io.atomic import replacing
+from facert.io.gltf.buffer import Buffer, write_container
 from facert.mesh.morphs import Morphs
 from facert.mesh.normals import vertex_normals
-
-_GLTF, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-_TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}
-_VERTICES, _INDICES = 34962, 34963
-_LARGEST = 2**32 - 1
-
-
-class _Buffer:
-    """The bytes of a file in the making, and their description in the JSON."""
-
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
-        self.size = 0
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, array: NDArray[Any], use: int | None = None) -> int:
-        """Append an array (n,) or (n, 3); return the number of its accessor."""
-        content = array.tobytes()
-        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(content)}
-        self.views.append(view | ({"target": use} if use else {}))
-        self.accessors.append(
-            {
-                "bufferView": len(self.views) - 1,
-                "componentType": _TYPES[array.dtype],
-                "count": len(array),
-                "type": "SCALAR" if array.ndim == 1 else "VEC3",
-                "min": np.atleast_1d(array.min(axis=0)).tolist(),
-                "max": np.atleast_1d(array.max(axis=0)).tolist(),
-            }
-        )
-        self.parts.append(content)
-        self.size += len(content)  # every item has four bytes, so all stays aligned
-        return len(self.accessors) - 1
-
-    def vertices(self, values: FloatArray) -> int:
-        """Append something of every vertex, (V, 3)."""
-        return self.add(values.astype("<f4"), _VERTICES)
-
-    def keys(self, values: FloatArray) -> int:
-        """Append numbers of an animation, flattened."""
-        return self.add(values.astype("<f4").ravel())
-
-    def corners(self, faces: IntArray) -> int:
-        """Append triangles (F, 3)."""
-        return self.add(faces.astype("<u4").ravel(), _INDICES)
 
 
 def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
@@ -82,22 +33,12 @@ def write_glb(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
     """
     if not len(morphs.neutral.faces):
         raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))
-    buffer = _Buffer()
-    document = _document(morphs, Path(path).stem, buffer)
-    text = json.dumps(document, separators=(",", ":"), ensure_ascii=True).encode()
-    text += b" " * (-len(text) % 4)
-    total = 12 + 8 + len(text) + 8 + buffer.size
-    if total > _LARGEST:
-        fix = "Choose fewer frames, or a larger tolerance."
-        raise InputError("output", "at most 4 GiB", f"{total} bytes", fix, str(path))
-    with replacing(path, overwrite) as temporary, temporary.open("wb") as file:
-        file.write(struct.pack("<III", _GLTF, 2, total))
-        file.write(struct.pack("<II", len(text), _JSON) + text)
-        file.write(struct.pack("<II", buffer.size, _BIN))
-        file.writelines(buffer.parts)
+    buffer = Buffer()
+    root = _document(morphs, Path(path).stem, buffer)
+    write_container(root, buffer, path, overwrite)
 
 
-def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+def _document(morphs: Morphs, name: str, buffer: Buffer) -> dict[str, Any]:
     node: dict[str, Any] = {"name": name, "mesh": 0}
     metres = in_metres(morphs.neutral.units) or 1.0
     if metres != 1.0:
@@ -112,14 +53,11 @@ def _document(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
         "nodes": [node],
         "meshes": [mesh],
         "materials": [_material(morphs.neutral)],
-        "accessors": buffer.accessors,
-        "bufferViews": buffer.views,
-        "buffers": [{"byteLength": buffer.size}],
         **animations,
     }
 
 
-def _mesh(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+def _mesh(morphs: Morphs, name: str, buffer: Buffer) -> dict[str, Any]:
     neutral = morphs.neutral
     normals = _unit_normals(neutral.vertices, neutral.faces)
     attributes = {
@@ -151,10 +89,10 @@ def _mesh(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
     }
 
 
-def _animation(morphs: Morphs, name: str, buffer: _Buffer) -> dict[str, Any]:
+def _animation(morphs: Morphs, name: str, buffer: Buffer) -> dict[str, Any]:
     sampler = {
         "input": buffer.keys(morphs.time - morphs.time[0]),
-        "output": buffer.keys(morphs.weights),
+        "output": buffer.keys(morphs.weights.ravel()),
         "interpolation": "LINEAR",
     }
     channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
