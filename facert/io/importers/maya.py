@@ -110,7 +110,14 @@ def _attributes(node: str) -> list[str]:
     """Keyable attributes of a node: a blendShape's weights by the names of its targets."""
     if not node or not cmds.objExists(node):
         return []
-    return cmds.listAttr(node, keyable=True, multi=True) or []
+    driven = {place.name for place in _places() if place.node == node and place.name}
+    there = cmds.listAttr(node, keyable=True, multi=True) or []
+    return [name for name in there if name not in driven]
+
+
+def _places() -> set[Place]:
+    """All that drivers move."""
+    return {motion.place for found in motions_of(DRIVERS).values() for motion in found}
 
 
 def _posed_attributes(node: str) -> list[str]:
@@ -125,8 +132,7 @@ def _posed_attributes(node: str) -> list[str]:
 
 def _keyed(node: str, names: Sequence[str]) -> set[float]:
     pairs = [(node, name) for name in names]
-    places = {m.place for found in motions_of(DRIVERS).values() for m in found}
-    pairs += [(p.node, p.name or f"{p.kind}{axis}") for p in places for axis in "XYZ"]
+    pairs += [(p.node, p.name or f"{p.kind}{axis}") for p in _places() for axis in "XYZ"]
     return {
         time
         for owner, name in pairs
@@ -184,9 +190,8 @@ def _numbers(place: Place, amount: Sequence[float]) -> dict[str, float]:
 def _driven_at(time: float, known: dict[str, float]) -> dict[str, float]:
     """The controls of drivers by where their nodes are."""
     motions = motions_of(DRIVERS)
-    places = {m.place for found in motions.values() for m in found if cmds.objExists(m.place.node)}
     measured: Sums = {}
-    for place in places:
+    for place in [place for place in _places() if cmds.objExists(place.node)]:
         if place.kind == "property":
             measured[place] = [float(cmds.getAttr(f"{place.node}.{place.name}", time=time))]
             continue

@@ -1,0 +1,131 @@
+"""Curve Tables of Unreal Engine, both ways: rows are curves, columns are times in seconds.
+
+In CSV the first cell is anybody's; facert's name there is its mark. Every cell holds a number, as
+Unreal takes a blank for 0. In JSON, a list with an object a curve, a gap is a key that is not
+there, and the blank before the first colon is facert's mark.
+
+Unreal drops blanks, commas and quotes from the names, tells no capitals from small letters, holds
+times in single precision, and refuses a row whose name or time it has already.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.data.rate import nominal_rate
+from facert.data.take import Source, Take, named_curves
+from facert.data.version import CREATED_BY, MARK
+from facert.errors import InputError, reading
+from facert.io.atomic import replacing
+from facert.io.guarded import read_beginning, read_text
+from facert.io.lines import check_width, parse_csv, to_numbers
+from facert.io.tables.json_frames import parsed
+
+_DROPPED = re.compile("[\"' ,\n\r\t]")
+_NAME = "Name"
+_MARK = re.compile(rf'{MARK}\d[^,\n]*,|\[\{{"{_NAME}" : '.encode())
+
+
+def write_curve_table(take: Take, path: Path, overwrite: bool = False) -> None:
+    """Write the poses of a take, or else its source weights, as CSV or JSON by the name's ending.
+
+    Raises `InputError` for markers, for names or times that Unreal takes for one, and for a gap in
+    CSV; `OutputExistsError` when `path` exists and `overwrite` is not set.
+    """
+    names, values = named_curves(take)
+    _require_names(names)
+    time = [f"{second:.9g}" for second in take.time]
+    if len(np.unique(take.time.astype(np.float32))) < len(time):
+        fix = "Write fewer frames: facert convert --fps 30."
+        raise InputError("/time", "times apart in single precision", "two that are one", fix)
+    is_json = path.suffix.lower() == ".json"
+    text = _json(names, time, values) if is_json else _csv(names, time, values)
+    with replacing(path, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def read_curve_table(path: Path) -> Take:
+    """Read a Curve Table as a take whose source is weights.
+
+    Raises `InputError` naming the row or cell that is at fault.
+    """
+    with reading(path):
+        is_json = path.suffix.lower() == ".json"
+        names, time, values = _read_json(path) if is_json else _read_csv(path)
+        order = np.argsort(time)
+        fps = nominal_rate(time[order])
+        return Take(time[order], Source(values[order], names), fps=fps)
+
+
+def bears_mark(path: Path) -> bool:
+    """Whether facert wrote a Curve Table."""
+    return _MARK.match(read_beginning(path)) is not None
+
+
+def _require_names(names: tuple[str, ...]) -> None:
+    """Refuse names that are none to Unreal, or one."""
+    there: dict[str, str] = {}
+    for name in names:
+        plain = _DROPPED.sub("", name).casefold()
+        other = there.setdefault(plain, name)
+        if plain in ("", "none") or other is not name:
+            found = repr(name) if other is name else f"{other!r} and {name!r}"
+            fix = "Rename it: facert convert --map."
+            raise InputError("names", "names that differ in Unreal", found, fix)
+
+
+def _csv(names: tuple[str, ...], time: list[str], values: FloatArray) -> str:
+    gaps = np.argwhere(np.isnan(values))
+    if len(gaps):
+        frame, column = gaps[0]
+        found = f"none for {names[column]!r} in frame {frame}"
+        fix = "Write a .curvetable.json, or fill the gaps: facert clean."
+        raise InputError("values", "a number in every frame", found, fix)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow([CREATED_BY, *time])
+    for name, row in zip(names, values.T, strict=True):
+        writer.writerow([name, *(f"{value:.9g}" for value in row)])
+    return text.getvalue()
+
+
+def _json(names: tuple[str, ...], time: list[str], values: FloatArray) -> str:
+    known = [dict(zip(time, row, strict=True)) for row in values.T.tolist()]
+    curves = [{when: v for when, v in row.items() if v == v} for row in known]
+    rows = [{_NAME: name, **curve} for name, curve in zip(names, curves, strict=True)]
+    return json.dumps(rows).replace(f'"{_NAME}": ', f'"{_NAME}" : ', 1).replace("}, {", "},\n{")
+
+
+def _read_csv(path: Path) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    header, rows = parse_csv(read_text(path), ",")
+    check_width(rows, header)
+    columns = range(1, len(header))
+    try:
+        time = np.array([float(cell) for cell in header[1:]])
+    except ValueError:
+        found, fix = ", ".join(header[1:4]), "Write a row a curve, and a column a time."
+        raise InputError("header", "times in seconds", found, fix) from None
+    values = to_numbers(rows, header, columns)
+    return tuple(row.cells[0] for row in rows), time, values.T
+
+
+def _read_json(path: Path) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    rows: Any = parsed(read_text(path))
+    try:
+        names = tuple(str(row.pop(_NAME)) for row in rows)
+        curves = [{float(key): float(value) for key, value in row.items()} for row in rows]
+    except (AttributeError, KeyError, TypeError, ValueError):
+        found, fix = "something else", "Export it as JSON from Unreal."
+        expected = f'objects with "{_NAME}" and numbers by time'
+        raise InputError("file", expected, found, fix) from None
+    time = sorted({when for curve in curves for when in curve})
+    values = [[curve.get(when, np.nan) for curve in curves] for when in time]
+    return names, np.array(time), np.array(values).reshape(len(time), len(names))
