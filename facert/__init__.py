@@ -20,12 +20,13 @@ from facert.data.version import VERSION
 
 if TYPE_CHECKING:
     from facert.data.rig import Rig
-    from facert.data.take import Controls, Source, Take
+    from facert.data.take import Controls, Corrections, Source, Take
     from facert.errors import FacertError, InputError
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
     from facert.io.formats import write_take_file as write_take
     from facert.posing.completed_pose import complete_pose
+    from facert.posing.corrected_take import correct_take as correct
     from facert.posing.suggested_frames import suggest_frames
     from facert.retarget.retargeter import Retargeter, load
     from facert.retarget.training import train
@@ -36,6 +37,7 @@ __version__ = VERSION
 
 __all__ = [
     "Controls",
+    "Corrections",
     "FacertError",
     "InputError",
     "Retargeter",
@@ -45,6 +47,7 @@ __all__ = [
     "Take",
     "Verdict",
     "complete_pose",
+    "correct",
     "judge",
     "load",
     "read_rig",
@@ -56,6 +59,7 @@ __all__ = [
 
 _HOMES = {
     "Controls": ("facert.data.take", "Controls"),
+    "Corrections": ("facert.data.take", "Corrections"),
     "FacertError": ("facert.errors", "FacertError"),
     "InputError": ("facert.errors", "InputError"),
     "Retargeter": ("facert.retarget.retargeter", "Retargeter"),
@@ -65,6 +69,7 @@ _HOMES = {
     "Take": ("facert.data.take", "Take"),
     "Verdict": ("facert.retarget.verdict", "Verdict"),
     "complete_pose": ("facert.posing.completed_pose", "complete_pose"),
+    "correct": ("facert.posing.corrected_take", "correct_take"),
     "judge": ("facert.retarget.verdict", "judge"),
     "load": ("facert.retarget.retargeter", "load"),
     "read_rig": ("facert.io.formats", "read_rig_file"),

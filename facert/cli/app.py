@@ -13,6 +13,7 @@ import typer
 from facert.cli.commands import (
     clean,
     convert,
+    correct,
     demo,
     drive,
     evaluate,
@@ -91,7 +92,12 @@ def options(
 
 PANELS: dict[str, dict[str, ModuleType]] = {
     "Pose and suggest": {"suggest": suggest, "pose": pose},
-    "Train and retarget": {"train": train, "regions": regions, "retarget": retarget},
+    "Train and retarget": {
+        "train": train,
+        "regions": regions,
+        "retarget": retarget,
+        "correct": correct,
+    },
     "Look and judge": {
         "inspect": inspect,
         "view": view,

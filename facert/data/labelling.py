@@ -46,16 +46,25 @@ def labelled(take: Take, poses: Poses) -> Take:
     Raises `InputError` for a pose without a frame, two for one frame, no pose at all, or a take
     whose controls are others.
     """
+    frames, controls, values = placed(take, poses)
+    params = np.full((len(take), len(controls.names)), np.nan)
+    if take.params is not None and len(take.labels):
+        params[:] = take.params
+    params[frames] = values
+    return replace(take, controls=controls, params=params, std=None, corrections=None)
+
+
+def placed(take: Take, poses: Poses) -> tuple[IntArray, Controls, FloatArray]:
+    """The frames (n,) of a take that poses are for, its controls, and the poses' values, (n, P).
+
+    Raises `InputError` as `labelled` does.
+    """
     with reading(poses.where):
         poses = _known(poses)
         frames = _by_time(take, poses) if poses.frames is None else _by_number(take, poses)
         _require_different(frames)
         controls, order = _common_controls(take, poses)
-        params = np.full((len(take), len(order)), np.nan)
-        if take.params is not None and len(take.labels):
-            params[:] = take.params
-        params[frames] = poses.values[:, order]
-        return replace(take, controls=controls, params=params, std=None, corrections=None)
+        return frames, controls, poses.values[:, order]
 
 
 def _known(poses: Poses) -> Poses:
@@ -196,6 +205,28 @@ def weights_as_poses(take: Take, rig: Shaped) -> Take:
     )
 
 
+def predicted_frames(take: Take) -> IntArray:
+    """The posed frames whose pose a model predicted: it has a standard deviation.
+
+    Of a result with corrections these are all others, whether the method had deviations or not.
+    """
+    if take.corrections is not None:
+        return np.setdiff1d(take.labels, take.corrections.frames)
+    if take.std is None:
+        return np.empty(0, dtype=np.int64)
+    return take.labels[(take.std[take.labels] > 0).any(axis=1)]
+
+
 def predicted_poses(take: Take) -> int:
-    """Number of posed frames that a model predicted: those with a standard deviation."""
-    return 0 if take.std is None else int((take.std[take.labels] > 0).any(axis=1).sum())
+    """Number of posed frames that a model predicted."""
+    return len(predicted_frames(take))
+
+
+def without_predicted(take: Take) -> Take:
+    """The take with the poses alone that somebody set."""
+    frames = predicted_frames(take)
+    if take.params is None:
+        return take
+    params = take.params.copy()
+    params[frames] = np.nan
+    return replace(take, params=params, std=None, corrections=None)

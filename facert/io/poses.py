@@ -12,7 +12,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.column_names import Role, role_of_name
 from facert.data.columns import require_there
-from facert.data.labelling import Poses, poses_of, predicted_poses
+from facert.data.labelling import Poses, poses_of, predicted_poses, without_predicted
 from facert.data.rate import frames_shown, standard_rate
 from facert.data.resampling import counted_at
 from facert.data.rig import Rig
@@ -54,8 +54,7 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
         else:
             take = read_any(path, kind="take", or_fps=fps, keep=keep, sparse=True)
             take = _at_rate(take, path, fps)
-            _require_set(take, path)
-            poses = poses_of(take)
+            poses = poses_of(_set_by_somebody(take, path))
             if take.clock_start and _has_column_of_times(path):
                 poses = replace(poses, time=take.time + take.clock_start, of_clock=True)
         return replace(poses, where=str(path))
@@ -95,8 +94,11 @@ def _at_rate(found: Take | Rig, path: Path, fps: float | None) -> Take:
     return counted_at(take, fps)
 
 
-def _require_set(take: Take, path: Path) -> None:
-    """Refuse a result of retargeting: what a model predicted would pass for somebody's poses."""
+def _set_by_somebody(take: Take, path: Path) -> Take:
+    """The take without poses that a model predicted: they would pass for somebody's.
+
+    A result of retargeting that holds no others is refused.
+    """
     predicted = predicted_poses(take)
     if predicted and predicted == len(take.labels):
         found = f"a standard deviation for all {predicted}: a model predicted them"
@@ -106,8 +108,9 @@ def _require_set(take: Take, path: Path) -> None:
         table = f"facert convert {path.name} {path.stem}.csv."
         raise InputError("/target/std", "poses that somebody set", found, fix + table)
     if predicted:
-        poses = plural(predicted, "pose")
-        log.warning("%s: %s with a standard deviation: predicted, taken as set", path.name, poses)
+        poses = plural(predicted, "predicted pose")
+        log.info("%s: %s left out, those that somebody set are taken", path.name, poses)
+    return without_predicted(take)
 
 
 def _frame_column(header: Sequence[str]) -> int | None:

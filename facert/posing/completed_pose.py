@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ class CompletedPose:
         Other plausible poses.
     held : tuple of str
         The controls that kept their value.
+    corrected : Take, optional
+        The retargeted frame that was corrected.
     """
 
     controls: Controls
@@ -50,6 +52,7 @@ class CompletedPose:
     std: FloatArray
     samples: FloatArray
     held: tuple[str, ...] = ()
+    corrected: Take | None = None
 
     @property
     def as_dict(self) -> dict[str, Any]:
@@ -64,12 +67,15 @@ class CompletedPose:
 
     @property
     def as_take(self) -> Take:
-        """A take with a pose a frame, the most probable one first; its source is what was given."""
+        """A take with a pose a frame, the most probable one first; its source is what was given.
+
+        A corrected pose has the time of its frame, and no standard deviation: it is somebody's.
+        """
         poses = np.vstack([self.pose, self.samples])
         std = np.full_like(poses, np.nan)
         std[0] = self.std
         values = np.tile(list(self.given.values()), (len(poses), 1))
-        return Take(
+        made = Take(
             time=np.arange(len(poses), dtype=np.float64),
             source=Source(values, tuple(self.given)),
             controls=self.controls,
@@ -77,6 +83,9 @@ class CompletedPose:
             std=std,
             fps=1.0,
         )
+        if self.corrected is None:
+            return made
+        return replace(made, time=made.time + self.corrected.time[0], std=None)
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.controls.names, values.tolist(), strict=True))
@@ -124,7 +133,7 @@ def complete_pose(
         hold without a start, or a character with fewer than three known poses.
     """
     controls, known = known_poses(character)
-    asked = _given(controls, given, soft)
+    asked = given_controls(controls, given, soft)
     if samples < 0:
         raise InputError("samples", "a number from 0", f"{samples}", "Ask for some, or for none.")
     held = _held(controls.names, hold, asked)
@@ -140,7 +149,7 @@ def complete_pose(
     names = np.array(controls.names, dtype=np.object_)
     named = dict(zip(names[asked.controls], asked.values.tolist(), strict=True))
     kept = tuple(names[held])
-    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept)
+    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept, start)
 
 
 def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
@@ -173,7 +182,15 @@ def _poses_of(take: Take) -> FloatArray | None:
     return take.animation
 
 
-def _given(controls: Controls, wanted: Mapping[str, float], soft: float) -> Given:
+def given_controls(controls: Controls, wanted: Mapping[str, float], soft: float = 0.0) -> Given:
+    """The given ones of a character's controls, with their values.
+
+    Raises
+    ------
+    InputError
+        When there are none; for an unknown name, with the nearest one; for a value that is no
+        number or outside of declared limits.
+    """
     if not wanted:
         raise InputError("given controls", "at least one", "none", "Set a control to a value.")
     if not (math.isfinite(soft) and soft >= 0.0):

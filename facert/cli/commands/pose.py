@@ -23,6 +23,7 @@ from facert.cli.shared.options import (
     file_option,
     option,
 )
+from facert.cli.shared.set_controls import parse_controls
 from facert.data.version import CREATED_BY
 from facert.errors import InputError, reading
 
@@ -98,7 +99,7 @@ def command(
     if hold and not start:
         raise typer.BadParameter("--hold keeps values of a frame: give it with --from TAKE:FRAME")
     model = model or DEFAULT_MODEL
-    given = _parse(wanted)
+    given = parse_controls(wanted)
     import facert
     from facert.io.registry import require_output
 
@@ -118,23 +119,6 @@ def command(
     if output is not None:
         _write(done, output, overwrite)
         console.show(f"wrote {output}")
-
-
-def _parse(wanted: list[str]) -> dict[str, float]:
-    """Names and values of ``NAME=VALUE``."""
-    given: dict[str, float] = {}
-    for text in wanted:
-        name, _, value = text.rpartition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            name = ""
-        if not name.strip():
-            raise typer.BadParameter(f"{text!r}: write it as in --set jawOpen=0.3")
-        if name.strip() in given:
-            raise typer.BadParameter(f"{name.strip()} is set twice")
-        given[name.strip()] = number
-    return given
 
 
 def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:

@@ -1,0 +1,249 @@
+"""``facert correct``: puts corrected poses into a result, and keeps them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from facert.cli.shared import console
+from facert.cli.shared.in_and_out import require_inputs
+from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, argument, file_option, option
+from facert.cli.shared.set_controls import parse_controls
+from facert.data.text import plural, printable
+from facert.errors import InputError, reading
+from facert.io.registry import OWN_ENDINGS, require_replaceable
+
+if TYPE_CHECKING:
+    from facert.data.take import Take
+
+ALL = "all"
+NAMED, LINES = 3, 10  # controls that are named, and frames that have a line
+SMALL = 0.005  # of the largest move: such a one is not worth a word
+
+
+def command(
+    path: Annotated[Path, argument("RESULT", "What retarget wrote (.h5).")],
+    frames: Annotated[
+        str, option("The frame to correct, from 0; several as 740..745 or 12,30.", "--frame")
+    ] = "",
+    wanted: Annotated[
+        list[str] | None, option("A control; again for more.", "--set", metavar="NAME=VALUE")
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        file_option("Whole poses instead, by a column frame or by time: of Blender, or a take."),
+    ] = None,
+    width: Annotated[
+        float | None,
+        option(
+            "Seconds over which a correction is blended, half of them before the frame.",
+            min=0.0,
+            show_default="0.5",
+        ),
+    ] = None,
+    hold: Annotated[
+        list[str] | None,
+        option("Controls that keep their value, as 'mouth*'; again for more.", metavar="PATTERN"),
+    ] = None,
+    only: Annotated[bool, option("Change the controls that are set, and no others.")] = False,
+    remove: Annotated[
+        str, option("Take the corrections of these frames back, or all.", metavar="FRAMES|all")
+    ] = "",
+    show: Annotated[bool, option("List the corrections in RESULT.", "--list")] = False,
+    model: Annotated[
+        Path | None,
+        option(
+            "Model whose poses show what the other controls then do.",
+            "--model",
+            "-m",
+            show_default=str(DEFAULT_MODEL),
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, option("Corrected result (.h5); else RESULT itself.", "--output", "-o")
+    ] = None,
+    overwrite: OVERWRITE = False,
+) -> None:
+    """Correct poses of a result; they are blended over time, kept, and learned from.
+
+    What is set is met exactly, and the other controls of the frame follow as in facert pose --from.
+    retarget puts the corrections in again, and train learns from them and from nothing predicted.
+
+    facert correct retargeted.h5 --frame 40 --set smile=0.6 --overwrite
+    facert correct retargeted.h5 --list
+    """
+    asked = _asked(frames, wanted or [], poses, remove, show)
+    if asked != "--frame" and (hold or only):
+        raise typer.BadParameter("--hold and --only are for --frame with --set")
+    require_inputs(path, poses)
+    take = _read(path)
+    if show:
+        return _list(take)
+    output = output or path
+    _require_output(output, overwrite)
+    with reading(path):
+        if remove:
+            made = _without(take, remove)
+        elif poses is not None:
+            made = _with_poses(take, poses, width)
+        else:
+            given = parse_controls(wanted or [])
+            made = _with_set(take, frames, given, width, hold or [], only, model)
+    _write(take, made, output)
+
+
+def _asked(frames: str, wanted: list[str], poses: Path | None, remove: str, show: bool) -> str:
+    """The one thing that is asked for."""
+    things = {
+        "--frame": frames or wanted,
+        "--poses": poses,
+        "--remove": remove,
+        "--list": show,
+    }
+    asked = [name for name, given in things.items() if given]
+    if len(asked) != 1:
+        text = "give --frame with --set NAME=VALUE, or one of --poses, --remove and --list"
+        raise typer.BadParameter(text)
+    if asked == ["--frame"] and not (frames and wanted):
+        raise typer.BadParameter("give both --frame and --set NAME=VALUE")
+    return asked[0]
+
+
+def _read(path: Path) -> Take:
+    """Read the result; other formats than facert's own hold no corrections."""
+    from facert.io.formats import read_take_file
+
+    if path.suffix.lower() not in OWN_ENDINGS:
+        fix = (
+            f"Retarget to .h5 and correct that; facert convert RESULT.h5 {path.name} "
+            "then writes it for other programs."
+        )
+        found = path.suffix or "none"
+        raise InputError("RESULT's ending", " or ".join(OWN_ENDINGS), found, fix, str(path))
+    return read_take_file(path)
+
+
+def _require_output(output: Path, overwrite: bool) -> None:
+    if output.suffix.lower() not in OWN_ENDINGS:
+        found, fix = output.suffix or "none", "Convert the corrected result afterwards."
+        raise InputError("--output", " or ".join(OWN_ENDINGS), found, fix)
+    require_replaceable(output, overwrite)
+
+
+def _with_set(
+    take: Take,
+    frames: str,
+    given: dict[str, float],
+    width: float | None,
+    hold: list[str],
+    only: bool,
+    model: Path | None,
+) -> Take:
+    """The take with some controls set in some frames; the others follow."""
+    import facert
+    from facert.data.corrections import WIDTH
+    from facert.data.ranges import parse_frames
+
+    character = None if only else facert.load(model or DEFAULT_MODEL)
+    wanted = dict.fromkeys(parse_frames(frames, "--frame"), given)
+    width = WIDTH if width is None else width
+    return facert.correct(take, wanted, character, width=width, hold=hold, only=only)
+
+
+def _with_poses(take: Take, path: Path, width: float | None) -> Take:
+    """The take with whole poses of a table or another take."""
+    import facert
+    from facert.data.corrections import WIDTH
+    from facert.data.labelling import placed
+    from facert.io.poses import read_poses
+
+    frames, _, values = placed(take, read_poses(path))
+    wanted = dict(zip(frames.tolist(), values, strict=True))
+    return facert.correct(take, wanted, width=WIDTH if width is None else width)
+
+
+def _without(take: Take, remove: str) -> Take:
+    """The take with corrections taken back."""
+    import numpy as np
+
+    from facert.data.corrections import put_in, taken_out, without
+    from facert.data.ranges import parse_frames
+
+    if take.corrections is None:
+        found, fix = "none in it", "facert correct --list shows what there is."
+        raise InputError("--remove", "a result with corrections", found, fix)
+    if remove == ALL:
+        return taken_out(take)
+    frames = np.array(parse_frames(remove, "--remove"), dtype=np.int64)
+    left = without(take.corrections, frames)
+    return taken_out(take) if left is None else put_in(take, left)
+
+
+def _write(take: Take, made: Take, output: Path) -> None:
+    """Write the result, and a line on each frame that has another pose now."""
+    from facert.io.formats import write_take_file
+
+    write_take_file(made, output, overwrite=True)
+    frames = _changed(take, made)
+    for frame in frames[:LINES]:
+        console.show(f"frame {frame} ({take.time[frame]:.3f} s): {_moves(take, made, frame)}")
+    if len(frames) > LINES:
+        console.show(f"and {plural(len(frames) - LINES, 'more frame')}")
+    console.show(f"wrote {output}")
+    count = 0 if made.corrections is None else len(made.corrections.frames)
+    if count:
+        text = "%s holds %s: facert train TAKE %s learns from what was corrected"
+        console.log.info(text, output.name, plural(count, "correction"), output.name)
+
+
+def _changed(take: Take, made: Take) -> list[int]:
+    """Frames that were corrected, or were before, and have another pose now."""
+    both = (one.corrections.frames for one in (take, made) if one.corrections is not None)
+    frames = sorted({frame for frames in both for frame in frames.tolist()})
+    assert take.params is not None  # it is a result
+    assert made.params is not None
+    return [f for f in frames if (take.params[f] != made.params[f]).any()]
+
+
+def _moves(before: Take, after: Take, frame: int) -> str:
+    """The controls that moved most from one pose to another, and how many others moved."""
+    import numpy as np
+
+    assert before.params is not None  # both are results of the same controls
+    assert after.params is not None
+    assert before.controls is not None
+    old, new = before.params[frame], after.params[frame]
+    sizes = np.abs(new - old)
+    first = np.argsort(-sizes, kind="stable")[:NAMED]
+    shown = [index for index in first.tolist() if sizes[index] > 0]
+    names = before.controls.names
+    moves = [f"{printable(names[index])} {old[index]:.3f} to {new[index]:.3f}" for index in shown]
+    others = int((sizes > SMALL * sizes.max()).sum()) - len(shown)
+    return ", ".join(moves) + (f" and {plural(others, 'other')}" if others > 0 else "")
+
+
+def _list(take: Take) -> None:
+    """Print the corrections, a row each."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from facert.data.corrections import taken_out
+    from facert.data.timecode import timecode
+
+    if take.corrections is None:
+        console.show("no corrections")
+        return
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("frame", "seconds", "timecode", "width"):
+        table.add_column(title, justify="right")
+    table.add_column("moved most")
+    bare = taken_out(take)
+    for frame, width in zip(take.corrections.frames, take.corrections.width, strict=True):
+        seconds = float(take.time[frame])
+        code = timecode(take.start_timecode, seconds, take.fps)
+        row = (f"{frame}", f"{seconds:.3f}", code, f"{width:g}")
+        table.add_row(*row, Text(_moves(bare, take, int(frame))))
+    console.out.print(table)
