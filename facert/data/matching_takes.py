@@ -84,14 +84,6 @@ class Named(NamedTuple):
     name: str
 
 
-def without_predicted(take: Take) -> Take:
-    """The take without the poses that a model predicted: those with a standard deviation."""
-    if take.std is None or take.params is None:
-        return take
-    predicted = np.asarray((take.std > 0).any(axis=1))
-    return replace(take, params=np.where(predicted[:, None], np.nan, take.params), std=None)
-
-
 def _numbered(noun: str, count: int) -> tuple[str, ...]:
     return tuple(f"{noun} {number}" for number in range(1, count + 1))
 
@@ -249,7 +241,7 @@ def _reach(one: Named, controls: Controls) -> FloatArray:
 def _with_controls(part: Take, name: str, controls: Controls) -> Take:
     """A take with its poses in the order of the controls."""
     if not _has_poses(part):
-        return replace(part, controls=controls, params=None, std=None)
+        return replace(part, controls=controls, params=None, std=None, corrections=None)
     assert part.controls is not None  # it has poses
     own = part.controls.names
     if own == controls.names and part.controls.limits is controls.limits:
@@ -264,7 +256,15 @@ def _with_controls(part: Take, name: str, controls: Controls) -> Take:
         None if rows is None else rows[:, columns]
         for rows in (part.params, part.std, part.animation)
     )
-    return replace(part, controls=controls, params=params, std=std, animation=animation)
+    corrections = None if part.corrections is None else part.corrections.of_controls(columns)
+    return replace(
+        part,
+        controls=controls,
+        params=params,
+        std=std,
+        animation=animation,
+        corrections=corrections,
+    )
 
 
 def _animation(one: Named, controls: Controls) -> FloatArray:

@@ -182,6 +182,14 @@ class Corrections:
         set_fields(self, frames=frozen(frames.astype(np.int64)), params=frozen(params))
         set_fields(self, width=frozen(width))
 
+    def of_controls(self, columns: IntArray) -> Corrections:
+        """The corrections with the controls in these columns, in their order."""
+        predicted, std = (
+            None if values is None else values[:, columns] for values in (self.predicted, self.std)
+        )
+        params = self.params[:, columns]
+        return replace(self, params=params, predicted=predicted, std=std)
+
     def require_fit(self, shape: tuple[int, ...]) -> None:
         """Check that these are corrections of a take with poses of this shape, (T, P)."""
         fix = "Correct the result that these corrections are of."

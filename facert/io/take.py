@@ -95,6 +95,14 @@ def holds_recording(path: Path) -> bool:
     return poses is not None and poses.open and not poses.predicted
 
 
+def holds_corrections(path: Path) -> bool:
+    """Whether a file is a take with corrections; they are not read."""
+    if stated_format(path) != TAKE_FORMAT:
+        return False
+    with open_guarded(path) as file:
+        return "/corrections/frames" in file
+
+
 class _Poses(NamedTuple):
     """Poses of the first frames of a take."""
 

@@ -20,7 +20,8 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.data.matching_takes import as_takes, without_predicted
+from facert.data.labelling import without_predicted
+from facert.data.matching_takes import as_takes
 from facert.data.normalisation import Normalisation
 from facert.data.subject import about
 from facert.data.take import SourceKind, Take

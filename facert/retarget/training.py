@@ -11,8 +11,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.columns import warn_of_clocks
-from facert.data.labelling import predicted_poses
-from facert.data.matching_takes import as_takes, without_predicted
+from facert.data.labelling import predicted_poses, without_predicted
+from facert.data.matching_takes import as_takes
 from facert.data.normalisation import Normalisation
 from facert.data.subject import about
 from facert.data.take import Take

@@ -61,6 +61,10 @@ def command(
     no_detect: NO_DETECT = False,
     no_smooth: NO_SMOOTH = False,
     target: TARGET = None,
+    drop: Annotated[
+        bool,
+        option("Leave out the corrections of IN, and of OUT as it was.", "--drop-corrections"),
+    ] = False,
     device: DEVICE = "cpu",
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
@@ -80,6 +84,7 @@ def command(
         mode=mode,
         options=options,
         target=target,
+        drop=drop,
         device=device,
         overwrite=overwrite,
     )
@@ -94,6 +99,7 @@ def _retarget(
     mode: Mode,
     options: MappingOptions,
     target: str | None,
+    drop: bool,
     device: str,
     overwrite: bool,
 ) -> None:
@@ -101,6 +107,8 @@ def _retarget(
     import time
 
     import facert
+    from facert.cli.shared.kept_corrections import with_kept
+    from facert.data.labelling import without_predicted
     from facert.io.formats import read_source_file
 
     retargeter = _loaded(model.resolve(), _stamp(model))
@@ -109,11 +117,12 @@ def _retarget(
     with reading(source):
         result = retargeter.retarget(take, mode, options(retargeter), device)
     seconds = time.perf_counter() - began
-    facert.write_take(result, output, overwrite)
+    made = result if drop else with_kept(result, source, take, output)
+    facert.write_take(made, output, overwrite)
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.show(f"wrote {output}")
-    _print_error(take, result, retargeter)
+    _print_error(without_predicted(take), result, retargeter)
 
 
 @lru_cache(maxsize=1)
