@@ -250,6 +250,19 @@ def fitting(pattern: str, names: Sequence[str]) -> list[int]:
     return []
 
 
+def fitting_some(pattern: str, names: Sequence[str], field: str) -> list[int]:
+    """Indices of the names that match, as `fitting` has it.
+
+    Raises `InputError` naming `field` where none does, with what may have been meant.
+    """
+    found = fitting(pattern, names)
+    if not found:
+        meant = instead_of(pattern, names)
+        fix = f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
+        raise InputError(field, "a name, or a pattern that some fit", repr(pattern), fix)
+    return found
+
+
 def instead_of(name: str, among: Sequence[str]) -> str | None:
     """Suggestions for a name that is not there, for a message.
 

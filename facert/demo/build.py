@@ -157,6 +157,7 @@ ACTOR = Build(
 
 ARKIT = replace(
     ACTOR,
+    blobs=(*ACTOR.blobs[:-1], Blob((0.0, -8.6, -2.2), (4.5, 4.4, 4.3), 1.2)),  # a shorter neck
     palette=Palette(
         skin=(0.80, 0.62, 0.50),
         blush=(0.80, 0.49, 0.42),

@@ -17,8 +17,8 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from facert.data.moments import Timed
 from facert.data.rate import whole_count
-from facert.data.take import Take
 from facert.data.text import printable
 from facert.data.timecode import (
     LIVE_LINK_RATE,
@@ -133,14 +133,15 @@ class VideoFrames:
 
 
 def open_video(
-    path: Path, take: Take, start: float | None = None, pixels: int = PIXELS
+    path: Path, take: Timed, start: float | None = None, pixels: int = PIXELS
 ) -> VideoFrames:
     """Open the video of a performance by the take's time, and log when it begins.
 
     Parameters
     ----------
     path : Path
-    take : Take
+    take : Timed
+        A take, or a mesh in motion.
     start : float, optional
         Seconds of the take at which the video begins; else by their timecodes if both have one,
         and 0 if not.
@@ -166,7 +167,7 @@ def open_video(
     return video
 
 
-def _between(take: Take, video: VideoFrames) -> float | None:
+def _between(take: Timed, video: VideoFrames) -> float | None:
     """Seconds from the take's start to the video's by their timecodes, at most half a day."""
     ours = _ticks(take.start_timecode, take.fps)
     theirs = _ticks(video.start_timecode, video.fps)
@@ -179,7 +180,7 @@ def _ticks(code: str, fps: float) -> int | None:
     return parse_timecode(code, LIVE_LINK_RATE if has_thousandths(code) else whole_count(fps))
 
 
-def _require_overlap(take: Take, video: VideoFrames) -> None:
+def _require_overlap(take: Timed, video: VideoFrames) -> None:
     first, last = float(take.time[0]), float(take.time[-1])
     if last >= video.start and first <= video.start + video.duration:
         return

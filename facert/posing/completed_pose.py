@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.names import NameIndex, fitting, instead_of, match
+from facert.data.names import NameIndex, fitting_some, instead_of, match
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.posing.completion import Completion
@@ -218,11 +218,7 @@ def _held(names: tuple[str, ...], patterns: Sequence[str], given: Given) -> IntA
     """The controls that fit a pattern and are not given, rising."""
     found: set[int] = set()
     for pattern in patterns:
-        places = fitting(pattern, names)
-        if not places:
-            fix = _did_you_mean(pattern, names)
-            raise InputError("hold", "controls, or a pattern that some fit", repr(pattern), fix)
-        found.update(places)
+        found.update(fitting_some(pattern, names, "hold"))
     return np.setdiff1d(np.array(sorted(found), dtype=np.int64), given.controls)
 
 

@@ -8,18 +8,23 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.render.faces import INK, Face, frame_faces, require_same_length
+from facert.data.moments import frame_label
+from facert.render.faces import (
+    INK,
+    Face,
+    FrameAt,
+    Pixels,
+    frame_faces,
+    require_same_length,
+)
 from facert.render.shade import Camera
 
 PIXELS = 300
 CAPTION = 28
 _AT_ONCE = 8  # frames that are drawn in parallel
-
-Pixels = NDArray[np.uint8]
 
 
 def sampled_frames(time: FloatArray, part: range, fps: float) -> IntArray:
@@ -39,8 +44,10 @@ def sampled_frames(time: FloatArray, part: range, fps: float) -> IntArray:
     return part.start + np.searchsorted((seconds[1:] + seconds[:-1]) / 2, moments)
 
 
-def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> Iterator[Pixels]:
-    """Pictures (H, W, 3) from 0 to 255 of some frames, one after the other.
+def draw_clip(
+    faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS, video: FrameAt | None = None
+) -> Iterator[Pixels]:
+    """Pictures (H, W, 3) from 0 to 255 of some frames, one after the other, each with its number.
 
     Parameters
     ----------
@@ -49,6 +56,8 @@ def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> 
     frames : array of int, shape (n,)
     pixels : int
         Width and height of each face; even, as video wants it.
+    video : callable, optional
+        The performer's, to the left of the faces.
 
     Raises
     ------
@@ -65,7 +74,11 @@ def draw_clip(faces: Sequence[Face], frames: IntArray, pixels: int = PIXELS) -> 
                 for face, camera in zip(faces, cameras, strict=True)
             ]
             for frame, pictures in zip(numbers, zip(*strips, strict=True), strict=True):
-                yield _side_by_side(pictures, faces, float(faces[0].motion.time[frame]))
+                columns = [(f.label, p) for f, p in zip(faces, pictures, strict=True)]
+                if video is not None:
+                    filmed = video(float(faces[0].motion.time[frame]))
+                    columns.insert(0, ("video", _squared(filmed, pixels)))
+                yield _side_by_side(columns, frame_label(faces[0].motion, int(frame)))
 
 
 def _draw(face: Face, camera: Camera, pixels: int, vertices: FloatArray) -> Pixels:
@@ -77,13 +90,22 @@ def _draw(face: Face, camera: Camera, pixels: int, vertices: FloatArray) -> Pixe
     return np.round(255 * on_white).astype(np.uint8)
 
 
-def _side_by_side(pictures: Sequence[Pixels], faces: Sequence[Face], seconds: float) -> Pixels:
-    pixels = len(pictures[0])
-    sheet = Image.new("RGB", (pixels * len(faces), pixels + CAPTION), "white")
+def _squared(filmed: Pixels | None, pixels: int) -> Pixels:
+    """A frame of a video in the middle of a white square; all white where there is none."""
+    square = Image.new("RGB", (pixels, pixels), "white")
+    if filmed is not None:
+        picture = ImageOps.contain(Image.fromarray(filmed), (pixels, pixels))
+        square.paste(picture, ((pixels - picture.width) // 2, (pixels - picture.height) // 2))
+    return np.asarray(square)
+
+
+def _side_by_side(columns: Sequence[tuple[str, Pixels]], label: str) -> Pixels:
+    pixels = len(columns[0][1])
+    sheet = Image.new("RGB", (pixels * len(columns), pixels + CAPTION), "white")
     text, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
-    for place, (picture, face) in enumerate(zip(pictures, faces, strict=True)):
+    for place, (name, picture) in enumerate(columns):
         sheet.paste(Image.fromarray(picture), (place * pixels, 0))
         middle = (place * pixels + pixels // 2, pixels + CAPTION // 2)
-        text.text(middle, face.label, INK, font, anchor="mm")
-    text.text((8, 8), f"{seconds:.2f} s", INK, font)
+        text.text(middle, name, INK, font, anchor="mm")
+    text.text((8, 8), label, INK, font, stroke_width=2, stroke_fill="white")
     return np.asarray(sheet)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import NameIndex, shape_drivers
@@ -20,6 +21,12 @@ _MOST_ROOM = 1.3
 _SAMPLED = 100  # vertices that distinguish the frames of a mesh
 ACTOR = "actor"  # the label of his face
 INK = "#3a3f47"  # of what is written and drawn beside faces
+
+
+Pixels = NDArray[np.uint8]
+
+FrameAt = Callable[[float], Pixels | None]
+"""From seconds of a take to the frame of a video (H, W, 3), or None where it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +114,11 @@ def drives(rig: Rig, names: Sequence[str]) -> bool:
     return True
 
 
-def require_drawable(take: Take, rig: Rig | None) -> None:
-    """Raise InputError unless there is a rig to draw a take of weights, and none for markers."""
-    if take.source.kind == "markers" and rig is not None:
+def require_drawable(take: Take, actor: Rig | Face | None) -> None:
+    """Raise InputError unless there is a face to draw a take of weights, and none for markers."""
+    if take.source.kind == "markers" and actor is not None:
         raise _misfit("a take of weights", "a take of markers")
-    if take.source.kind == "weights" and rig is None:
+    if take.source.kind == "weights" and actor is None:
         raise _misfit("the actor's rig, for a take of weights", "none")
 
 

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from facert.data.names import NameIndex
+from facert.data.arrays import FloatArray
+from facert.data.names import fitting_some
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.render.faces import INK, require_poses
@@ -34,7 +36,7 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
     truth : Take, optional
         A take of the same performance with the controls that are drawn.
     names : sequence of str
-        The controls to draw; the most varying ones if empty.
+        The controls to draw, or patterns such as ``"mouth*"``; the most varying ones if empty.
 
     Returns
     -------
@@ -47,25 +49,48 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
     """
     from matplotlib.figure import Figure
 
-    if len(names) > MAX_CURVES:
-        raise InputError(
-            "--controls", f"at most {MAX_CURVES} names", f"{len(names)}", "Draw several pictures."
-        )
-    columns = [_column(take, name) for name in names] or most_varying(take, MOST)
+    columns = _columns(take, names) or most_varying(take, MOST)
     figure = Figure(figsize=(10, 1.05 * len(columns) + 0.7), dpi=150, layout="constrained")
     grid = figure.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
     assert take.controls is not None  # poses come with controls
     for axes, column in zip(grid, columns, strict=True):
         name = take.controls.names[column]
         if truth is not None:
-            values = require_poses(truth)[:, _column(truth, name)]
+            values = require_poses(truth)[:, _columns(truth, [name])[0]]
             axes.plot(truth.time, values, color=TRUTH, linewidth=2.4, label="truth")
         _draw_curve(axes, take, column)
         _tidy(axes, name)
     grid[-1].set_xlabel("seconds", color=INK)
+    _number_frames(grid[0], take)
     if truth is not None or take.std is not None:
-        grid[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize=8)
+        shown = grid[0].get_legend_handles_labels()
+        figure.legend(*shown, loc="outside upper right", ncols=3, frameon=False, fontsize=8)
     return figure
+
+
+def _number_frames(axes: Axes, take: Take) -> None:
+    """Numbers of the frames, as options count them, above the curves."""
+    from matplotlib.ticker import MaxNLocator
+
+    frames = np.arange(len(take))
+    step = 1 / take.fps
+    # One more frame at either end, so that the margins have numbers too.
+    seconds = np.concatenate([[take.time[0] - step], take.time, [take.time[-1] + step]])
+    around = np.concatenate([[-1], frames, [len(take)]])
+
+    def to_frames(at: ArrayLike) -> FloatArray:
+        within = np.clip(at, seconds[0], seconds[-1])
+        return np.asarray(np.interp(within, seconds, around) + (at - within) * take.fps)
+
+    def to_seconds(at: ArrayLike) -> FloatArray:
+        within = np.clip(at, around[0], around[-1])
+        return np.asarray(np.interp(within, around, seconds) + (at - within) / take.fps)
+
+    top = axes.secondary_xaxis("top", functions=(to_frames, to_seconds))
+    top.xaxis.set_major_locator(MaxNLocator(10, integer=True, steps=[1, 2, 5, 10]))
+    top.set_xlabel("frame", color=INK, fontsize=8)
+    top.tick_params(colors=INK, labelsize=8)
+    top.spines["top"].set_visible(False)
 
 
 def _draw_curve(axes: Axes, take: Take, column: int) -> None:
@@ -95,17 +120,13 @@ def most_varying(take: Take, count: int) -> list[int]:
     return sorted(np.argsort(-spread, kind="stable")[:count].tolist())
 
 
-def _column(take: Take, name: str) -> int:
-    """Index of a control."""
+def _columns(take: Take, names: Sequence[str]) -> list[int]:
+    """Indices of the controls that fit names or patterns, each once."""
     require_poses(take)
     assert take.controls is not None  # poses come with controls
-    names = take.controls.names
-    place = NameIndex.among(names, [name], "/target/names", quiet=True).find(name)
-    if place is None:
-        raise InputError(
-            "/target/names",
-            "the controls that are to be drawn",
-            f"no {name!r}",
-            f"It has: {', '.join(names)}.",
-        )
-    return place
+    there = take.controls.names
+    found = [place for name in names for place in fitting_some(name, there, "--controls")]
+    if len(found) > MAX_CURVES:
+        fix = "Draw several pictures."
+        raise InputError("--controls", f"at most {MAX_CURVES} names", f"{len(found)}", fix)
+    return list(dict.fromkeys(found))

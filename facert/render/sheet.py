@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.moments import frame_label
 from facert.data.rig import Mesh, Rig
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.render.faces import (
     INK,
     Face,
+    FrameAt,
     actor_face,
     frame_faces,
     require_drawable,
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CELL, HEADING = 2.2, 0.3  # inches of a picture, and above one of a contact sheet
+LEGEND = 0.28  # inches below a contact sheet
+MARKERS = "dots: markers, darker where nearer; rings: where each mostly is, lines: how it moved"
+WEIGHTS = "the actor's face in the tracked weights"
 PIXELS = 320
 MAX_FRAMES = 40
 ACROSS = 5  # least pictures in a row of a contact sheet, if there are so many
@@ -37,9 +42,13 @@ _POINTS_INCHES, _POINTS_RESOLUTION = 4.5, 150
 
 
 def render_sheet(
-    faces: Sequence[Face], frames: Sequence[int], take: Take | None = None, pixels: int = PIXELS
+    faces: Sequence[Face],
+    frames: Sequence[int],
+    take: Take | None = None,
+    pixels: int = PIXELS,
+    video: FrameAt | None = None,
 ) -> Figure:
-    """A row of pictures for each face.
+    """A row of pictures for each face, below the numbers of the frames.
 
     Parameters
     ----------
@@ -50,6 +59,8 @@ def render_sheet(
         Its markers, if it has any, make the first row.
     pixels : int
         Width and height of a picture.
+    video : callable, optional
+        The performer's, which makes the first row.
 
     Raises
     ------
@@ -61,19 +72,22 @@ def render_sheet(
     require_same_length(faces)
     frames = checked_frames(frames, len(faces[0].motion))
     with_markers = take is not None and take.source.kind == "markers"
-    height, width = len(faces) + with_markers, len(frames)
+    height, width = len(faces) + with_markers + (video is not None), len(frames)
     figure = Figure(figsize=(CELL * width + 0.4, CELL * height + 0.3), dpi=pixels / CELL)
     grid = figure.subplots(height, width, squeeze=False)
     # Little space between the pictures, room for labels at the left and times on top.
     wide, high = figure.get_size_inches()
     figure.subplots_adjust(0.38 / wide, 0.02 / high, 1 - 0.02 / wide, 1 - 0.28 / high, 0.02, 0.02)
-    for axes, time in zip(grid[0], faces[0].motion.time[frames], strict=True):
-        axes.set_title(f"{time:.2f} s", fontsize=9, color=INK)
+    motion, lines = faces[0].motion, iter(grid)
+    for axes, frame in zip(grid[0], frames, strict=True):
+        axes.set_title(frame_label(motion, frame), fontsize=9, color=INK)
+    if video is not None:
+        _draw_video(line := next(lines), video, motion.time[frames])
+        _label(line[0], "video")
     if take is not None and with_markers:
-        _draw_markers(grid[0], take.source.values, frames, 0.58)
-        _label(grid[0, 0], "markers")
-    cameras = frame_faces(faces, frames)
-    for line, face, camera in zip(grid[int(with_markers) :], faces, cameras, strict=True):
+        _draw_markers(line := next(lines), take.source.values, frames, 0.58)
+        _label(line[0], "markers")
+    for line, face, camera in zip(lines, faces, frame_faces(faces, frames), strict=True):
         _draw_face(line, face, camera, frames, pixels)
         _label(line[0], face.label)
     for axes in grid.flat:
@@ -82,9 +96,15 @@ def render_sheet(
 
 
 def contact_sheet(
-    take: Take, frames: Sequence[int], headings: Sequence[str], rig: Rig | None = None
+    take: Take,
+    frames: Sequence[int],
+    headings: Sequence[str],
+    actor: Rig | Face | None = None,
+    video: FrameAt | None = None,
 ) -> Figure:
     """The actor in some frames, from the front: as markers, or as the face that weights drive.
+
+    Below stands what is drawn.
 
     Parameters
     ----------
@@ -92,36 +112,59 @@ def contact_sheet(
     frames : sequence of int
     headings : sequence of str
         One a frame.
-    rig : Rig, optional
-        The actor's, for a take of weights: a shape, or its left and right half, for each that the
-        take and the rig have in common.
+    actor : Rig or Face, optional
+        For a take of weights: a rig with a shape, or its left and right half, for each that the
+        take and the rig have in common; or the face that they drive.
+    video : callable, optional
+        The performer's, above each picture, or alone for weights without a face.
 
     Raises
     ------
     InputError
-        When there are too many frames, or a take of weights comes without a rig, or markers with
-        one.
+        When there are too many frames, or a take of weights comes without face and video, or
+        markers with a rig.
     """
     from matplotlib.figure import Figure
 
-    require_drawable(take, rig)
     frames = checked_frames(frames, len(take))
-    width = min(len(frames), max(ACROSS, math.ceil(math.sqrt(WIDE * len(frames)))))
-    height = -(-len(frames) // width)
-    figure = Figure((CELL * width, (CELL + HEADING) * height), dpi=PIXELS / CELL)
-    grid = list(figure.subplots(height, width, squeeze=False).flat)
-    margin = 0.75 * HEADING / ((CELL + HEADING) * height)
-    figure.subplots_adjust(0, 0, 1, 1 - margin, wspace=0.02, hspace=HEADING / CELL)
-    for axes in grid:
+    layers = _contact_layers(take, frames, actor, video)
+    width = min(len(frames), max(ACROSS, math.ceil(math.sqrt(WIDE * len(frames) / len(layers)))))
+    height = len(layers) * -(-len(frames) // width)
+    inches = (CELL + HEADING) * height + LEGEND
+    figure = Figure((CELL * width, inches), dpi=PIXELS / CELL)
+    grid = figure.subplots(height, width, squeeze=False)
+    top = 1 - 0.75 * HEADING / inches
+    figure.subplots_adjust(0, LEGEND / inches, 1, top, wspace=0.02, hspace=HEADING / CELL)
+    for axes in grid.flat:
         axes.set_axis_off()
-    if rig is None:
-        _draw_markers(grid, take.source.values, frames, 0.55, rings=True)
-    else:
-        face = actor_face(take, rig)
-        _draw_face(grid, face, frame_faces([face], frames)[0], frames, PIXELS)
-    for axes, heading in zip(grid, headings, strict=False):
+    for place, (_, draw) in enumerate(layers):
+        draw(list(grid[place :: len(layers)].flat))
+    for axes, heading in zip(grid[:: len(layers)].flat, headings, strict=False):
         axes.set_title(heading, fontsize=9, color=INK, pad=3)
+    style = {"fontsize": 7, "color": INK, "va": "bottom", "wrap": True}
+    figure.text(0.06 / (CELL * width), 0.05 / inches, "; ".join(text for text, _ in layers), style)
     return figure
+
+
+def _contact_layers(
+    take: Take, frames: list[int], actor: Rig | Face | None, video: FrameAt | None
+) -> list[tuple[str, Callable[[Sequence[Axes]], None]]]:
+    """What is drawn of each frame, one above the other, with its line of the legend."""
+    layers: list[tuple[str, Callable[[Sequence[Axes]], None]]] = []
+    if video is not None:
+        moments = take.time[frames]
+        layers.append(("the performer's video", lambda cells: _draw_video(cells, video, moments)))
+    if actor is None and video is not None and take.source.kind == "weights":
+        return layers
+    require_drawable(take, actor)
+    if actor is None:
+        values = take.source.values
+        layers.append((MARKERS, lambda cells: _draw_markers(cells, values, frames, 0.55, True)))
+        return layers
+    face = actor_face(take, actor) if isinstance(actor, Rig) else actor
+    camera = frame_faces([face], frames)[0]
+    layers.append((WEIGHTS, lambda cells: _draw_face(cells, face, camera, frames, PIXELS)))
+    return layers
 
 
 def draw_points(mesh: Mesh, vertices: IntArray) -> Figure:
@@ -208,9 +251,22 @@ def _draw_face(
     for axes, frame in zip(cells, frames, strict=False):
         picture = face.picture(face.motion.fetch(np.array([frame]))[0], camera, pixels)
         if picture is None:
-            axes.text(0.5, 0.5, "no pose", ha="center", color=INK, transform=axes.transAxes)
+            _write(axes, face.blank)
         else:
             axes.imshow(picture)
+
+
+def _draw_video(cells: Sequence[Axes], video: FrameAt, moments: FloatArray) -> None:
+    for axes, seconds in zip(cells, moments, strict=False):
+        picture = video(float(seconds))
+        if picture is None:
+            _write(axes, "no video")
+        else:
+            axes.imshow(picture)
+
+
+def _write(axes: Axes, text: str) -> None:
+    axes.text(0.5, 0.5, text, ha="center", color=INK, transform=axes.transAxes)
 
 
 def _label(axes: Axes, text: str) -> None:

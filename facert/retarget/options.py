@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.names import fitting, instead_of, nearest
+from facert.data.names import fitting_some, nearest
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.preprocess.clean_source import SourceOptions
@@ -69,7 +69,7 @@ class Adjustments:
                 near = nearest(unknown[0], ENTRIES)
                 fix = f"Did you mean {near}?" if near else "Remove it."
                 raise InputError(f"{name}.{unknown[0]}", expected, "another entry", fix)
-            columns = _columns(name, names)
+            columns = fitting_some(name, names, f"[{name}]")
             if "gain" in table:
                 made.gain[columns] = _number(name, table, "gain", -LARGEST, LARGEST)
             if "limits" in table:
@@ -142,16 +142,6 @@ class PoseScale:
     def std(self, std: FloatArray | None) -> FloatArray | None:
         """Standard deviation of poses from that of normalised ones, (T, P) or (P,)."""
         return None if std is None else std * self._std_scale
-
-
-def _columns(pattern: str, names: Sequence[str]) -> list[int]:
-    """The controls that a name, or a name with wildcards, stands for."""
-    found = fitting(pattern, names)
-    if not found:
-        meant = instead_of(pattern, names)
-        fix = f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
-        raise InputError(pattern, "a control, or a pattern that some fit", "none", fix)
-    return found
 
 
 def _number(name: str, table: Mapping[str, Any], entry: str, low: float, high: float) -> float:

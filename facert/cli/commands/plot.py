@@ -22,7 +22,7 @@ def command(
     output: Annotated[Path, argument("OUT.png", "The picture.")],
     truth_path: TRUTH = None,
     controls: Annotated[
-        str, option("For instance smile,jaw_open; by default the most varying.")
+        str, option("For instance jaw_open,'mouth*'; by default the most varying.")
     ] = "",
     target: TARGET = None,
     overwrite: OVERWRITE = False,
@@ -30,7 +30,7 @@ def command(
     """Draw controls over time, with their uncertainty and the truth.
 
     facert plot retargeted.h5 curves.png
-    facert plot retargeted.h5 jaw.svg --controls jaw_open
+    facert plot retargeted.h5 mouth.svg --controls 'mouth*,jaw_open'
     """
     from facert.io.formats import read_take_file, targets_for
     from facert.render.faces import require_poses
@@ -55,11 +55,16 @@ def command(
 
 def _comparable(take: Take, truth: Take, names: Sequence[str]) -> tuple[Take, Take]:
     """The two takes with the controls that they share, in the spelling of the first."""
+    from facert.data.names import fitting
     from facert.data.shared_controls import require_shared
 
     fix = "Give the truth of this take, or choose another --target."
     shared = require_shared(truth, take, fix)
-    lacking = [name for name in names if name in shared.of_result]
+    lacking = [
+        name
+        for name in names
+        if fitting(name, shared.of_result) and not fitting(name, shared.names)
+    ]
     if lacking:
         found = f"none among its {plural(len(shared.names + shared.of_truth), 'control')}"
         raise InputError(

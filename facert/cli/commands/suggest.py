@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import require_name, save_picture
+from facert.cli.shared.files import (
+    actor_file,
+    open_footage,
+    read_actor,
+    require_name,
+    save_picture,
+)
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     AS_JSON,
@@ -17,6 +23,8 @@ from facert.cli.shared.options import (
     SEED,
     SHAPES,
     TARGET,
+    VIDEO,
+    VIDEO_START,
     argument,
     file_option,
     option,
@@ -46,9 +54,17 @@ def command(
     sheet: Annotated[
         Path | None, file_option("A contact sheet of the frames.", metavar="PNG")
     ] = None,
-    rig_path: Annotated[
-        Path | None, file_option("The actor's rig, to draw tracked weights.", "--rig")
+    actor_path: Annotated[
+        Path | None,
+        file_option(
+            "The actor's rig, to draw tracked weights; none: no face.",
+            "--rig",
+            "--actor",
+            show_default="facert's own, for ARKit's shapes",
+        ),
     ] = None,
+    video_path: VIDEO = None,
+    video_start: VIDEO_START = None,
     target: TARGET = None,
     shapes: SHAPES = None,
     as_json: AS_JSON = False,
@@ -63,35 +79,38 @@ def command(
     """
     import json
 
+    from facert.data.moments import frame_label
     from facert.errors import reading
-    from facert.io.formats import read_rig_file
     from facert.posing.suggested_frames import suggest_frames
     from facert.render.faces import require_drawable
     from facert.render.sheet import MAX_FRAMES, contact_sheet
 
-    if rig_path is not None and sheet is None:
-        raise typer.BadParameter("--rig is for the sheet: give --sheet as well")
-    require_inputs(take_path, rig_path)
+    if sheet is None and (actor_path or video_path):
+        option = "--rig" if actor_path else "--video"
+        raise typer.BadParameter(f"{option} is for the sheet: give --sheet as well")
+    require_inputs(take_path, actor_file(actor_path), video_path)
     if sheet is not None:
         require_name(sheet, overwrite)
         if count > MAX_FRAMES:
             raise typer.BadParameter(f"a sheet shows at most {MAX_FRAMES} frames")
-    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
     model = _model(have) if have not in ("", LABELS) else None
     take = _read(take_path, target, have, model)
     with reading(take_path):
-        if sheet is not None:
-            require_drawable(take, rig)
+        actor = read_actor(take, actor_path, shapes) if sheet else None
+        footage = open_footage(video_path, take, video_start)
+        if sheet is not None and footage is None:
+            require_drawable(take, actor)
         found = suggest_frames(take, count, model or _posed(take, have), seed)
     rows = _rows(take, found)
     if as_json:
         typer.echo(json.dumps({"file": str(take_path), "frames": rows}, indent=2))
     else:
-        _print(rows)
+        _print(take, found.frames.tolist(), rows)
     if sheet is not None:
+        frames, video = found.frames.tolist(), None if footage is None else footage.at
         with reading(take_path):
-            headings = [f"{row['frame']}   {_moment(row)}" for row in rows]
-            figure = contact_sheet(take, found.frames.tolist(), headings, rig)
+            headings = [frame_label(take, frame) for frame in frames]
+            figure = contact_sheet(take, frames, headings, actor, video)
         save_picture(figure, sheet, overwrite)
         console.log.info("%s: %s", sheet, plural(len(rows), "frame"))
 
@@ -129,31 +148,27 @@ def _model(path: str) -> Retargeter:
 
 def _rows(take: Take, found: Suggestion) -> list[dict[str, object]]:
     """A line for each frame; without a timecode where the take has none."""
-    from facert.data.timecode import timecode
+    from facert.data.moments import timecode_of
 
     rows: list[dict[str, object]] = []
     for frame, share in zip(found.frames.tolist(), found.shares.tolist(), strict=True):
-        seconds = float(take.time[frame])
-        code = timecode(take.start_timecode, seconds, take.fps)
-        row: dict[str, object] = {"frame": frame, "seconds": seconds}
+        row: dict[str, object] = {"frame": frame, "seconds": float(take.time[frame])}
+        code = timecode_of(take, frame)
         rows.append(row | ({"timecode": code} if code else {}) | {"share": share})
     return rows
 
 
-def _moment(row: dict[str, object]) -> str:
-    return str(row.get("timecode") or f"{row['seconds']:.2f} s")
-
-
-def _print(rows: Sequence[dict[str, object]]) -> None:
+def _print(take: Take, frames: Sequence[int], rows: Sequence[dict[str, object]]) -> None:
     from rich import box
     from rich.table import Table
+
+    from facert.data.moments import moment
 
     table = Table(box=box.SIMPLE)
     for name in ("frame", "timecode" if "timecode" in rows[0] else "time", "stands for"):
         table.add_column(name, justify="right")
-    for row in rows:
-        table.add_row(str(row["frame"]), _moment(row), f"{row['share']:.1%}")
+    for frame, row in zip(frames, rows, strict=True):
+        table.add_row(str(frame), moment(take, frame), f"{row['share']:.1%}")
     console.out.print(table)
     console.show("stands for: the share of the take's frames that are nearest to it")
-    in_time = sorted((str(row["frame"]) for row in rows), key=int)
-    console.show(f"in order of time: {','.join(in_time)}")
+    console.show(f"in order of time: {','.join(map(str, sorted(frames)))}")

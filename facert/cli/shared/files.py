@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from facert.data.moments import Timed
     from facert.data.take import Take
+    from facert.io.video_frames import VideoFrames
     from facert.render.faces import Face
 
 PICTURES = (".png", ".pdf", ".svg")
@@ -61,22 +63,64 @@ def read_observed(path: Path, target: str | None, no_detect: bool) -> Take:
         return take if no_detect else without_faults(take)
 
 
+NO_ACTOR = Path("none")  # for --actor
+
+
+def actor_file(path: Path | None) -> Path | None:
+    """The file of ``--actor``, None where there is none to read."""
+    return None if path == NO_ACTOR and not path.exists() else path
+
+
 def read_actor(take: Take, path: Path | None, shapes: str | None) -> Face | None:
-    """The face of an actor whose weights were tracked, if his rig is there.
+    """The face of an actor whose weights were tracked: by his rig, or facert's stand-in for ARKit.
 
     Raises
     ------
     InputError
-        When the take holds markers, or the rig has a shape for none of the weights.
+        When there is a rig, but the take holds markers, or the rig has a shape for none of the
+        weights.
     """
     from facert.io.formats import read_rig_file
     from facert.render.faces import actor_face
 
     if path is None:
+        return _stand_in(take)
+    if actor_file(path) is None:
         return None
     if take.source.kind != "weights":
         raise InputError("--actor", "a take of weights", "markers", "Leave it out.")
     return actor_face(take, read_rig_file(path, shapes))
+
+
+def _stand_in(take: Take) -> Face | None:
+    """The face of facert for weights of ARKit; none for others, which the log says."""
+    from facert.demo.stand_in import is_tracked, stand_in_face
+
+    if take.source.kind != "weights":
+        return None
+    if not is_tracked(take):
+        console.log.info("the weights are not ARKit's: to see the actor's face, --actor RIG")
+        return None
+    text = "the actor's face is facert's stand-in for ARKit's shapes; --actor RIG shows his own,"
+    console.log.info("%s --actor none leaves it out", text)
+    return stand_in_face(take)
+
+
+def open_footage(
+    path: Path | None, take: Timed, start: float | None, pixels: int = 480
+) -> VideoFrames | None:
+    """The performer's video by the take's time, if there is one.
+
+    Raises
+    ------
+    InputError
+        When it is no video or shows nothing of the take; when there is only its start.
+    """
+    from facert.io.video_frames import open_video
+
+    if path is None and start is not None:
+        raise InputError("--video-start", "the video, --video FILE", "none", "Give it, or neither.")
+    return None if path is None else open_video(path, take, start, pixels)
 
 
 def write_beside(

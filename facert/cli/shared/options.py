@@ -69,7 +69,26 @@ DRIVERS = Annotated[
     file_option("Controls that move bones or objects of the rig.", "--drivers", metavar="TOML"),
 ]
 TRUTH = Annotated[Path | None, file_option("The true poses of the same frames.", "--truth")]
-ACTOR = Annotated[Path | None, file_option("The actor's rig, to draw tracked weights.", "--actor")]
+ACTOR = Annotated[
+    Path | None,
+    file_option(
+        "The actor's rig, to draw tracked weights; none: no face of his.",
+        "--actor",
+        show_default="facert's own, for ARKit's shapes",
+    ),
+]
+VIDEO = Annotated[
+    Path | None, file_option("The performer's video, beside the face, by time.", "--video")
+]
+VIDEO_START = Annotated[
+    float | None,
+    file_option(
+        "When the video begins, in seconds of the take.",
+        "--video-start",
+        show_default="by both timecodes, else 0",
+        metavar="SECONDS",
+    ),
+]
 CONTROLS = Annotated[
     Path | None,
     file_option("Gain, limits and smoothing of single controls.", "--controls", metavar="TOML"),

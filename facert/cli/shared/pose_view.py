@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import read_actor, require_name
+from facert.cli.shared.files import actor_file, read_actor, require_name
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import DEFAULT_MODEL
@@ -45,7 +45,7 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
 
     if files.rig is None:
         raise typer.BadParameter("--view draws the character: give its rig with --rig")
-    require_inputs(files.rig, files.take, files.actor)
+    require_inputs(files.rig, files.take, actor_file(files.actor))
     rig = read_rig_file(files.rig, files.shapes)
     take = None if files.take is None else read_take_file(files.take, files.target)
     session = _session(files, rig, take, overwrite)
