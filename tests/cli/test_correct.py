@@ -1,3 +1,4 @@
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -21,15 +22,23 @@ def model(take):
     return api.train(take, api.Settings(method="gpr"))
 
 
-@pytest.fixture
-def shot(take, model, tmp_path, monkeypatch):
-    """A result, its recording and its model, in the working folder."""
-    monkeypatch.chdir(tmp_path)
-    model.save("model.safetensors")
-    api.write_take(replace(take, params=None, animation=None), "recording.h5")
+@pytest.fixture(scope="module")
+def made(take, model, tmp_path_factory):
+    """A folder with a result, its recording and its model; and the result."""
+    folder = tmp_path_factory.mktemp("made")
+    model.save(folder / "model.safetensors")
+    api.write_take(replace(take, params=None, animation=None), folder / "recording.h5")
     result = model.retarget(replace(take, params=None))
-    api.write_take(result, "shot.h5")
-    return result
+    api.write_take(result, folder / "shot.h5")
+    return folder, result
+
+
+@pytest.fixture
+def shot(made, tmp_path, monkeypatch):
+    """The result, which lies in the working folder with its recording and its model."""
+    shutil.copytree(made[0], tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return made[1]
 
 
 def plain(text):
