@@ -132,7 +132,11 @@ class Settings:
     ] = True
     neutral: Annotated[
         str | None,
-        About("Frames in which the actor rests, as 12 or 0..20.", unset="the smallest pose"),
+        About(
+            "Frames in which the actor rests, as 12 or 0..20; of several takes one each, in their "
+            "order or as FILE:0..20.",
+            unset="the smallest pose",
+        ),
     ] = None
 
     def __post_init__(self) -> None:

@@ -84,6 +84,12 @@ class Named(NamedTuple):
     name: str
 
 
+def without_poses(take: Take) -> Take:
+    """What was recorded, alone."""
+    nothing = replace(take, params=None, std=None, animation=None, corrections=None)
+    return replace(nothing, controls=None)
+
+
 def _numbered(noun: str, count: int) -> tuple[str, ...]:
     return tuple(f"{noun} {number}" for number in range(1, count + 1))
 

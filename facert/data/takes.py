@@ -54,6 +54,15 @@ class Takes:
         """Number of posed frames of all takes."""
         return sum(len(part.labels) for part in self.parts)
 
+    @property
+    def posed(self) -> Takes:
+        """Those with a posed frame; all where none has."""
+        posed = [place for place, part in enumerate(self.parts) if len(part.labels)]
+        if len(posed) in (0, len(self.parts)):
+            return self
+        names = tuple(self.names[place] for place in posed)
+        return replace(self, parts=tuple(self.parts[place] for place in posed), names=names)
+
     def with_parts(self, parts: Sequence[Take]) -> Takes:
         """The same with other takes in place of these."""
         return replace(self, parts=tuple(parts))

@@ -1,6 +1,8 @@
 """Preparation of recorded takes for training: all that `train` learns from.
 
-Each take is cleaned on its own, by its own noise, gaps and clock; what is learned is of all.
+Each take is cleaned on its own, by its own noise, gaps and clock; noise and motion are then learned
+from all of them. Methods are given the frames of the takes in which some have a pose: those of
+another shot, in which none has, make them worse (`experiments/second_take.py`).
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ class Prepared:
     # Without what no frame shows, bad markers, noise and gaps, as far as the settings ask. Frames
     # that show too little to be learned from are as they were.
     takes: Takes
-    take: Take  # The frames of all of them, one after the other
+    take: Take  # Frames of those with a pose, one take after the other
     measured: Source  # The same with noise and gaps
     step: float  # From one frame to the next, normalised units: σ_t, Eq. (14)
     units: Normalisation  # Of the measured source
@@ -122,22 +124,27 @@ def prepare(given: Take | Takes, settings: Settings) -> Prepared:
     takes = as_takes(given)
     observed = _calibrated(_each(takes, partial(_without_faults, settings=settings)), settings)
     observed = _observed_part(observed)
-    sources = [part.source for part in observed.parts]
-    matrices = [source.matrix for source in sources]
-    units = Normalisation.of(np.concatenate(matrices), f"/source/{sources[0].kind}")
+    posed = observed.posed
+    measured = posed.joined.source
+    units = Normalisation.of(measured.matrix, f"/source/{measured.kind}")
     _warn_of_distance(observed, units)
     cleaned = [_cleaned(part, name, settings) for part, name in observed.named]
+    estimate = _of_all(observed, [found for _, found in cleaned], units)
     clean = observed.with_parts([part for part, _ in cleaned])
-    moving = [place for place, (_, found) in enumerate(cleaned) if found is not None]
-    found = [one for _, one in cleaned if one is not None]
-    estimate: MotionEstimate | PooledEstimate | None = found[0] if found else None
-    if len(cleaned) > 1 and found:
-        times = [observed.parts[place].time for place in moving]
-        estimate = pooled(found, [matrices[place] for place in moving], times, units)
-    measured = sources[0].followed_by(sources[1:])
-    step = _step(matrices) if estimate is None else estimate.sigma_t
+    step = _step(posed) if estimate is None else estimate.sigma_t
     step = max(step / units.scale, LEAST_NOISE)
-    return Prepared(clean, clean.joined, measured, step, units, estimate)
+    return Prepared(clean, clean.posed.joined, measured, step, units, estimate)
+
+
+def _of_all(
+    takes: Takes, found: Sequence[MotionEstimate | None], units: Normalisation
+) -> MotionEstimate | PooledEstimate | None:
+    """Noise and motion of all takes whose frames follow each other."""
+    moving = [(part, one) for part, one in zip(takes.parts, found, strict=True) if one is not None]
+    if len(found) == 1 or not moving:
+        return found[0]
+    matrices = [part.source.matrix for part, _ in moving]
+    return pooled([one for _, one in moving], matrices, [part.time for part, _ in moving], units)
 
 
 def _each(takes: Takes, work: Callable[[Take], Take]) -> Takes:
@@ -195,7 +202,7 @@ def _calibrated(takes: Takes, settings: Settings) -> Takes:
 def _observed_part(takes: Takes) -> Takes:
     """Takes without markers or weights that no frame shows: nothing can be learned of them."""
     first = takes.parts[0].source
-    seen = np.any([part.source.valid.any(axis=0) for part in takes.parts], axis=0)
+    seen = np.any([part.source.valid.any(axis=0) for part in takes.posed.parts], axis=0)
     if seen.all():
         return takes
     silent = [name for name, there in zip(first.names, seen, strict=True) if not there]
@@ -208,9 +215,8 @@ def _observed_part(takes: Takes) -> Takes:
 
 def _warn_of_distance(takes: Takes, units: Normalisation) -> None:
     """Warn of takes that lie far from the first: by their unit, or as the head stands elsewhere."""
-    first = np.nanmedian(units.apply(takes.parts[0].source.matrix), axis=0)
-    for part, name in takes.named[1:]:
-        centre = np.nanmedian(units.apply(part.source.matrix), axis=0)
+    first, *others = (_centre(units.apply(part.source.matrix)) for part in takes.parts)
+    for name, centre in zip(takes.names[1:], others, strict=True):
         away = float(np.nanmedian(np.abs(centre - first)))
         if away > APART:
             log.warning(
@@ -218,6 +224,13 @@ def _warn_of_distance(takes: Takes, units: Normalisation) -> None:
                 "unit, or head motion that facert stabilise takes out?",
                 *(name, takes.names[0], away),
             )
+
+
+def _centre(X: FloatArray) -> FloatArray:
+    """Mean of each column of X (T, d), (d,); NaN for one that shows nothing."""
+    seen = ~np.isnan(X)
+    total = np.where(seen, X, 0.0).sum(axis=0)
+    return np.where(seen.any(axis=0), total / np.maximum(seen.sum(axis=0), 1), np.nan)
 
 
 def _warn_of_zeros(source: Source) -> None:
@@ -230,9 +243,9 @@ def _warn_of_zeros(source: Source) -> None:
         log.warning("%s exactly at (0, 0, 0): lost ones should be NaN", positions)
 
 
-def _step(takes: Sequence[FloatArray]) -> float:
+def _step(takes: Takes) -> float:
     """The distance from one frame to the next in takes whose frames hardly follow each other."""
-    X = separated(takes)
+    X = separated([part.source.matrix for part in takes.parts])
     return largest_step(X, capture_noise(X))
 
 

@@ -119,10 +119,9 @@ def _warn_of_results(takes: Takes) -> None:
         raise _all_predicted(sum(counts))
     for (part, name), count in zip(takes.named, counts, strict=True):
         if count:
-            log.warning(
-                "%s: %s with a standard deviation: predicted, and not learned from; of %s it is",
-                *(name, plural(count, "pose"), plural(len(part.labels) - count, "other")),
-            )
+            own = plural(len(part.labels) - count, "other pose")
+            text = "%s: %s predicted by a model, and not learned from; %s learned from"
+            log.warning(text, name, plural(count, "pose"), own)
 
 
 def _of_takes(takes: Takes) -> dict[str, Any]:

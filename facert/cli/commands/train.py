@@ -13,7 +13,15 @@ import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.in_and_out import require_inputs
-from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, TARGET, argument, option
+from facert.cli.shared.options import (
+    DEFAULT_MODEL,
+    OVERWRITE,
+    TARGET,
+    argument,
+    file_option,
+    option,
+)
+from facert.cli.shared.takes import listed_files, read_takes
 from facert.errors import InputError, reading
 from facert.io.registry import require_replaceable
 from facert.methods.registry import REGISTRY
@@ -49,7 +57,8 @@ def with_settings(function: Callable[..., None]) -> Callable[..., None]:
 def _option(name: str) -> inspect.Parameter:
     """The option of a setting."""
     kind, about = DESCRIBED[name]
-    plain = next((one for one in (bool, int, float) if one in (kind, *get_args(kind))), str)
+    plain: type = next((one for one in (bool, int, float) if one in (kind, *get_args(kind))), str)
+    plain = list[str] if name == "neutral" else plain  # one for each take
     methods = f" One of {', '.join(REGISTRY)}." if name == "method" else ""
     words = "|".join(choices(kind)) or None
     made = option(
@@ -62,14 +71,25 @@ def _option(name: str) -> inspect.Parameter:
 
 @with_settings
 def command(
-    take: Annotated[
-        Path | None,
-        argument("TAKE", "Take with poses in some frames; by default the built-in one."),
+    paths: Annotated[
+        list[Path] | None,
+        argument(
+            "TAKE...",
+            "Takes of one actor, with poses in some frames of one at least; by default the "
+            "built-in one.",
+        ),
     ] = None,
     output: Annotated[Path, option("Model file to write.", "--output", "-o")] = DEFAULT_MODEL,
     predicted: Annotated[
         bool, option("Learn from poses that a model predicted as well.", "--allow-predicted")
     ] = False,
+    animation: Annotated[
+        list[Path] | None,
+        file_option(
+            "Old animation of the character: poses without a frame. Can be repeated.",
+            metavar="FILE",
+        ),
+    ] = None,
     config: Annotated[
         Path | None,
         option("File with any of the settings; options given here come first.", metavar="TOML"),
@@ -93,12 +113,13 @@ def command(
     overwrite: OVERWRITE = False,
     **options: Any,
 ) -> None:
-    """Learn to retarget from a take's poses, its other frames, and old animation.
+    """Learn to retarget from poses in takes, their other frames, and old animation.
 
     facert train facert-demo/training.h5
     facert train facert-demo/training.h5 --method gpr -o gpr.safetensors
     """
-    require_inputs(take, start, config)
+    paths, animation = paths or [], animation or []
+    require_inputs(*paths, *animation, start, config)
     _require_output(output, curve)
     options["regions"] = _regions(regions := options["regions"])
 
@@ -121,17 +142,13 @@ def command(
     continues = checkpoint is not None and checkpoint.continues
     overwrite_model = overwrite or continues
     require_replaceable(output, overwrite_model)
-    data = (
-        replace(_read(take, target), std=None, corrections=None)
-        if predicted
-        else _read(take, target)
-    )
-    _check_regions(regions, settings.regions, data)
+    takes = read_takes(paths, target, animation, predicted)
+    _check_regions(regions, settings.regions, takes.parts[0])
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
-    with reading(take or "the built-in take"), ProgressBar() as bar:
-        retargeter = facert.train(data, settings, Monitors(*monitors, bar), begin)
+    with reading(listed_files(paths)), ProgressBar() as bar:
+        retargeter = facert.train(takes, settings, Monitors(*monitors, bar), begin)
     retargeter.save(output, overwrite_model)
     status = retargeter.figures.get("status")
     if checkpoint is not None and status in ("converged", "stalled"):
@@ -151,6 +168,8 @@ def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, 
         with reading(config):
             settings = settings.with_changes(read_toml(config, "latent_dim = 8"))
     given = {name: value for name, value in options.items() if value is not None}
+    if "neutral" in given:
+        given["neutral"] = "; ".join(given["neutral"])
     try:
         return settings.with_changes(given)
     except InputError as error:
@@ -205,17 +224,6 @@ def _require_output(output: Path, curve: Path | None) -> None:
         raise InputError(
             "--output", "a folder that can be made", f"{error.strerror}", "Choose another place."
         ) from error
-
-
-def _read(path: Path | None, target: str | None) -> Take:
-    from facert.io.formats import read_take_file
-
-    if path is not None:
-        return read_take_file(path, target=target)
-    from facert.demo import training_take
-
-    console.log.info("no take given: training on the built-in demo take")
-    return training_take()
 
 
 def _print_table(retargeter: Retargeter, output: Path) -> None:
