@@ -19,7 +19,8 @@ def test_every_function_of_a_format_is_there(one) -> None:
 
 
 def test_endings_are_those_of_a_kind() -> None:
-    assert endings("write", "take") == (".h5", ".hdf5", ".livelink.csv", ".csv", ".json")
+    tables = (".livelink.csv", ".curvetable.csv", ".curvetable.json", ".csv", ".json")
+    assert endings("write", "take") == (".h5", ".hdf5", *tables)
     assert endings("read", "mesh") == (".glb", ".gltf", ".obj", ".ply")
     assert ".csv of Live Link Face, another tracker or plain, .json of" in listed("read", "take")
 
