@@ -21,6 +21,7 @@ from facert.data.version import VERSION
 if TYPE_CHECKING:
     from facert.data.rig import Rig
     from facert.data.take import Controls, Corrections, Source, Take
+    from facert.data.verdict import Verdict
     from facert.errors import FacertError, InputError
     from facert.io.formats import read_rig_file as read_rig
     from facert.io.formats import read_take_file as read_take
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from facert.posing.suggested_frames import suggest_frames
     from facert.retarget.retargeter import Retargeter, load
     from facert.retarget.training import train
-    from facert.retarget.verdict import Verdict, judge
+    from facert.retarget.verdict import judge
     from facert.settings import Settings
 
 __version__ = VERSION
@@ -67,7 +68,7 @@ _HOMES = {
     "Settings": ("facert.settings", "Settings"),
     "Source": ("facert.data.take", "Source"),
     "Take": ("facert.data.take", "Take"),
-    "Verdict": ("facert.retarget.verdict", "Verdict"),
+    "Verdict": ("facert.data.verdict", "Verdict"),
     "complete_pose": ("facert.posing.completed_pose", "complete_pose"),
     "correct": ("facert.posing.corrected_take", "correct_take"),
     "judge": ("facert.retarget.verdict", "judge"),

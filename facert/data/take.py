@@ -224,6 +224,8 @@ class Take:
         Unit of the marker positions, e.g. ``"cm"``; empty when unknown.
     start_timecode, up_axis : str
         As recorded; empty when unknown.
+    created_by, model : str
+        The program that wrote the file; the model that predicted the poses. Empty when unknown.
     clock_start : float
         Seconds on the recorder's clock that are 0 in `time`; 0 where `time` is that clock.
     corrections : Corrections, optional
@@ -248,12 +250,13 @@ class Take:
     created_by: str = field(default="")
     clock_start: float = 0.0
     corrections: Corrections | None = None
+    model: str = ""
 
     def __post_init__(self) -> None:
         time = float_array(self.time, "/time")
         frames = len(self.source.values)
         require_time(time, frames, self.fps)
-        for name in ("units", "start_timecode", "up_axis", "created_by"):
+        for name in ("units", "start_timecode", "up_axis", "created_by", "model"):
             require_plain(getattr(self, name), f"attribute {name}")
         if not np.isfinite(self.clock_start):
             expected, found = "seconds on the recorder's clock", f"{self.clock_start}"

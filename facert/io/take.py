@@ -19,11 +19,12 @@
 ``  predicted``       (T, P)               the poses without corrections
 ``  std``             (T, P)               optional: their standard deviation
 attributes                                 format, format_version, fps, units, created_by,
-                                           optional start_timecode, up_axis, clock_start
+                                           optional start_timecode, up_axis, clock_start, model
 ==================  =====================  =========================================================
 
-``/source/std``, ``/source/filled`` and ``/source/head`` are written beside a take for who looks for
-them; reading passes over these and over anything else that it does not know.
+``/source/std``, ``/source/filled`` and ``/source/head``, and the verdict of `facert.io.verdict`,
+are written beside a take for who looks for them; reading passes over these and over anything else
+that it does not know.
 
 A file with corrections has format version 2, any other 1: who does not know of corrections would
 take predicted poses for somebody's.
@@ -53,6 +54,8 @@ from facert.io.hdf5 import (
     stated_format,
 )
 
+Beside = Mapping[str, NDArray[Any] | tuple[str, ...]]
+"""Arrays, and lists of text, by their paths in a file."""
 VERSION = 2
 _WITHOUT_CORRECTIONS = 1
 _LOOKED_AT = 2**18  # numbers of poses that show what a take is
@@ -78,6 +81,7 @@ def read_take(path: Path) -> Take:
             start_timecode=file.text_attribute("start_timecode"),
             up_axis=file.text_attribute("up_axis"),
             created_by=file.text_attribute("created_by"),
+            model=file.text_attribute("model"),
             clock_start=file.number_attribute("clock_start", 0.0),
             corrections=None if params is None else _read_corrections(file, params),
         )
@@ -131,11 +135,11 @@ def write_take(
     take: Take,
     path: Path,
     overwrite: bool = False,
-    beside: Mapping[str, NDArray[Any]] = MappingProxyType({}),
+    beside: Beside = MappingProxyType({}),
 ) -> None:
     """Write a take file; the same take gives the same bytes.
 
-    `beside` has further arrays by their path in the file, which reading passes over.
+    `beside` has further arrays and texts by their path in the file, which reading passes over.
 
     Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
@@ -145,13 +149,17 @@ def write_take(
         file.attribute("units", take.units)
         file.attribute("start_timecode", take.start_timecode)
         file.attribute("up_axis", take.up_axis)
+        file.attribute("model", take.model)
         file.attribute("clock_start", take.clock_start or "")
         file.array("/time", take.time)
         _write_source(file, take.source)
         _write_target(file, take)
         _write_corrections(file, take.corrections)
         for where, values in beside.items():
-            file.array(where, values)
+            if isinstance(values, tuple):
+                file.names(where, values)
+            else:
+                file.array(where, values)
 
 
 def _read_source(file: GuardedFile) -> Source:

@@ -10,6 +10,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, SourceKind, Take
+from facert.data.text import listed, plural, printable
 from facert.methods.base import Method
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
@@ -46,6 +47,10 @@ class TrainedModel:
         The source with the actor at rest, in its units; NaN where it is not known.
     labelled : array, shape (l, d_x), or None
         The source in the posed frames, gaps filled; files of earlier versions lack it.
+    name : str
+        The file that it was read from; empty when it was not.
+    takes : tuple of str
+        Names of the takes that it was trained on, where they are known.
     """
 
     method: Method
@@ -61,6 +66,8 @@ class TrainedModel:
     poses: FloatArray | None = None
     motion: Motion | None = None
     labelled: FloatArray | None = None
+    name: str = ""
+    takes: tuple[str, ...] = ()
 
     def without_known(self, take: Take) -> Take:
         """The take without the poses that this was trained on, for an error on unseen ones."""
@@ -88,6 +95,14 @@ class TrainedModel:
     def settings(self) -> Settings:
         """The settings it was trained with, defaults filled in."""
         return self.method.settings
+
+    @property
+    def description(self) -> str:
+        """The model in a line: its file, method, and what it learned from."""
+        poses = plural(self.labels, "pose")
+        origin = f" of {listed(self.takes, 3)}" if self.takes else ""
+        name = f"{printable(self.name)}: " if self.name else ""
+        return f"{name}{self.settings.method}, {poses}{origin}"
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -52,6 +52,7 @@ def write_model(model: TrainedModel, path: Path, overwrite: bool) -> None:
         "created_by": CREATED_BY,
         "versions": library_versions(),
         "labels": model.labels,
+        "takes": list(model.takes),
         **model.facts,
     }
     if model.motion is not None:
@@ -111,6 +112,8 @@ def read_model(path: Path, make: type[Model]) -> Model:
             poses=arrays.get("target.poses"),
             motion=_motion(arrays),
             labelled=arrays.get("source.labelled"),
+            name=path.name,
+            takes=_texts(metadata.get("takes")),
         )
         _check_fit(model, arrays, metadata)
     return model
@@ -120,6 +123,11 @@ def _count(value: object) -> int:
     if not isinstance(value, (int, float)) or value != abs(value) or value % 1:
         raise ValueError(f"{value!r} labels")
     return int(value)
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    """A list of text; earlier releases wrote none."""
+    return tuple(map(str, value)) if isinstance(value, list) else ()
 
 
 def _motion(arrays: Mapping[str, FloatArray]) -> Motion | None:

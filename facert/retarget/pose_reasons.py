@@ -10,21 +10,25 @@ from facert.data.arrays import BoolArray, FloatArray
 from facert.data.resampling import PAUSE
 from facert.data.take import Take
 from facert.data.text import listed, plural
+from facert.data.verdict import Reason
 from facert.retarget.model import TrainedModel
-from facert.retarget.reasons import Reason, found_in, level_of, most
+from facert.retarget.reasons import found_in, level_of, most
 
 CUT = 0.1
 """A control is clipped where its prediction went beyond its bound by this share of its range."""
-CLIPPED = (0.02, 0.25)
+CLIPPED = (0.15, np.inf)
 """Shares of the frames with a clipped control: to look at, and bad."""
-UNSURE = (0.12, 0.25)
-"""Standard deviations of poses relative to the controls' ranges: to look at, and bad."""
-UNSURE_SHARE = (0.05, 0.4)
-"""Shares of frames that are unsure."""
-JUMP = 0.25
+UNSURE, MORE = 0.12, 1.3
+"""A frame is unsure whose standard deviation is this share of the controls' ranges, and so many
+times as large as in posed frames."""
+UNSURE_SHARE = 0.05
+"""A take is to be looked at of which this share is unsure."""
+POOR = 0.2
+"""Error at poses left out, relative to the controls' ranges, of a model to be looked at."""
+JUMP = 0.35
 """A pose jumps that leaves its neighbours by this share of the controls' ranges, RMS."""
-JUMPS = (1, 20)
-"""Jumps a minute."""
+JUMPS = (3.0, 60.0)
+"""Jumps a minute: to look at, and bad."""
 RESTING = 0.25
 """An end of a range that is nearer to the usual pose than this share of it is one of rest."""
 REACHED = 1e-6
@@ -50,27 +54,35 @@ def relative_to(ranges: FloatArray, amounts: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(amounts**2, axis=1)) / size)
 
 
-def pose_reasons(result: Take, model: TrainedModel) -> tuple[list[Reason], FloatArray]:
-    """Reasons in the poses of a result, and how unsure each frame is, (T,)."""
+def pose_reasons(
+    result: Take, model: TrainedModel, unlike: BoolArray
+) -> tuple[list[Reason], FloatArray]:
+    """Reasons in the poses of a result, and how unsure each frame is, (T,).
+
+    In frames that are `unlike` the posed ones, (T,), a control is clipped for that reason.
+    """
     assert result.params is not None  # retargeted
     ranges = ranges_of(model)
     unsure = np.zeros(len(result)) if result.std is None else relative_to(ranges, result.std)
     unsure = np.nan_to_num(unsure)  # somebody's pose has no deviation
     reasons = [
-        *_clipped(result, model, ranges),
-        *_unsure(unsure, result.time),
+        *_clipped(result, model, ranges, unlike),
+        *_unsure(unsure, usual_std(model, ranges), result.time, unlike),
+        *_poor(model, ranges),
         *_jumps(result, ranges),
         *_idle(result, model, ranges),
     ]
     return reasons, unsure
 
 
-def _clipped(result: Take, model: TrainedModel, ranges: FloatArray) -> Iterator[Reason]:
+def _clipped(
+    result: Take, model: TrainedModel, ranges: FloatArray, unlike: BoolArray
+) -> Iterator[Reason]:
     """Controls whose predictions were cut at a bound that is no rest."""
     beyond = beyond_bounds(result, model)
     if beyond is None:
         return
-    cut = beyond > CUT * ranges
+    cut = (beyond > CUT * ranges) & ~unlike[:, None]
     mask = np.asarray(cut.any(axis=1))
     if not mask.any():
         return
@@ -114,16 +126,38 @@ def beyond_bounds(result: Take, model: TrainedModel) -> FloatArray | None:
     return beyond
 
 
-def _unsure(unsure: FloatArray, time: FloatArray) -> Iterator[Reason]:
-    """Frames whose standard deviation is large."""
-    mask = unsure > UNSURE[0]
-    if not mask.any():
-        return
-    share, worse = float(mask.mean()), float(np.mean(unsure > UNSURE[1]))
-    level = "bad" if worse >= UNSURE_SHARE[1] else level_of(share, UNSURE_SHARE[0], np.inf)
-    text = f"a standard deviation of {unsure[mask].mean():.0%} of the range {found_in(mask, time)}"
-    cure = "facert suggest TAKE --have MODEL names frames to pose"
-    yield Reason("unsure", level, text, cure, np.flatnonzero(mask))
+def usual_std(model: TrainedModel, ranges: FloatArray) -> float:
+    """Standard deviation in posed frames, relative to the controls' ranges (P,)."""
+    if model.labelled is None or not len(model.labelled):
+        return 0.0
+    std = model.method.predict(model.source_units.apply(model.labelled)).std
+    if std is None:
+        return 0.0
+    return float(np.median(relative_to(ranges, std * model.target_units.scale)))
+
+
+def _unsure(
+    unsure: FloatArray, usual: float, time: FloatArray, unlike: BoolArray
+) -> Iterator[Reason]:
+    """Frames whose standard deviation is large, beyond what is usual and not for being unlike."""
+    mask = (unsure > max(UNSURE, MORE * usual)) & ~unlike
+    if mask.any():
+        level = level_of(float(mask.mean()), UNSURE_SHARE, np.inf)
+        text = f"standard deviation {unsure[mask].mean():.0%} of the range, {usual:.0%} is usual, "
+        cure = "often hidden markers: fill them, or pose frames there"
+        text += found_in(mask, time)
+        yield Reason("unsure", level, text, cure, np.flatnonzero(mask))
+
+
+def _poor(model: TrainedModel, ranges: FloatArray) -> Iterator[Reason]:
+    """The reason of a model that errs much at the very poses that it learned from."""
+    error = model.figures.get("cross-validation error")
+    size = float(np.sqrt(np.mean(ranges**2)))
+    if isinstance(error, float) and error > POOR * size > 0.0:
+        text = f"{plural(model.labels, 'pose')} explain little: each is missed by the others by "
+        text += f"{error / size:.0%} of the range"
+        cure = "facert suggest TAKE --have MODEL names frames to pose"
+        yield Reason("few poses", "look at it", text, cure, np.empty(0, dtype=np.int64))
 
 
 def _jumps(result: Take, ranges: FloatArray) -> Iterator[Reason]:

@@ -164,6 +164,7 @@ class Retargeter(TrainedModel):
             std=std,
             animation=None,
             corrections=None,
+            model=self.description,
         )
 
 

@@ -15,25 +15,37 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
 from facert.data.take import Source, Take
+from facert.data.verdict import Level, Reason
 from facert.preprocess.clean_source import other_unit
 from facert.preprocess.faults import Reach, find_faults
 from facert.preprocess.head_motion import rigid_motion
 from facert.retarget.model import TrainedModel
 from facert.retarget.novelty import NEW, over_names, relative_lengths, unexplained, usual_variance
-from facert.retarget.reasons import Reason, found_in, level_of, most
+from facert.retarget.reasons import found_in, level_of, most
 
+UNLIKE = ("head motion", "far from training", "new expressions", "other unit")
+"""Kinds of reasons for which frames are unlike the posed ones."""
 EXPLAINED = 0.6
 """A cause is named where less than this share of what was unexplained is left without it."""
 HEAD_MARKERS = 5
 """With fewer, an expression may pass for motion of the head."""
-MOVED = 1.0
-"""Times as far as in any posed frame, at least, for a head to have moved."""
+MOVED = 0.5
+"""Share of how far it went in posed frames, from which on a head counts as moved: an expression
+moves it a little."""
+TILT = 0.3
+"""What all frames have in common counts from this amount on: one frame may reach it by chance."""
 SIZES = (0.6, 1.7)
 """A face that is smaller or larger by more is in another unit."""
-FEW, MANY = 0.02, 0.15
-"""Shares of the frames that are unlike the posed ones: to look at, and bad."""
+FEW, MANY = 0.02, 0.2
+"""Shares of the frames that are new: to look at, and bad."""
+LONG = 0.5
+"""The share from which on a moving head is bad."""
+NOISY = 0.025
+"""Standard deviation of the cleaned source, in normalised units, of a take to be looked at."""
 HIDDEN = (0.1, 0.5)
 """Shares of a take's values that were bad: to look at, and bad."""
+OFTEN = 0.05
+"""A marker is named that was bad in this share of the frames."""
 LOST = 0.5
 """A frame is lost that shows less than this share of the source."""
 GONE = (0.02, 0.3)
@@ -77,10 +89,11 @@ def unlike(frames: FloatArray, model: TrainedModel) -> Unlike | None:
         vectors = np.where(head[:, None], still, vectors)
     left = relative_lengths(vectors, variance, kind)
     common = np.median(vectors, axis=0)
-    apart = relative_lengths(vectors - common, variance, kind)
-    placed = (over_names(left) > NEW) & (over_names(apart) < EXPLAINED * over_names(left))
-    left = np.where(placed[:, None], apart, left)
     offset = relative_lengths(common[None], variance, kind)[0]
+    apart = relative_lengths(vectors - common, variance, kind)
+    most_of_it = over_names(apart) < EXPLAINED * over_names(left)
+    placed = (over_names(left) > TILT) & most_of_it & (over_names(offset[None]) > TILT)
+    left = np.where(placed[:, None], apart, left)
     return Unlike(amounts, left, head, placed, offset, degrees)
 
 
@@ -131,7 +144,8 @@ def source_reasons(
     found = unlike(frames, model)
     if found is None:
         return reasons, None
-    return [*reasons, *_of_unlike(found, result.time, model)], over_names(found.left)
+    reasons += [*_of_unlike(found, result.time, model), *_noise(result, model)]
+    return reasons, found.amounts
 
 
 def _of_unlike(found: Unlike, time: FloatArray, model: TrainedModel) -> Iterator[Reason]:
@@ -140,22 +154,42 @@ def _of_unlike(found: Unlike, time: FloatArray, model: TrainedModel) -> Iterator
     if found.head.any():
         degrees = found.degrees[found.head].max()
         text = f"the head moves, by up to {degrees:.0f} degrees against the training take"
-        yield _by_share("head motion", found.head, time, text, "facert stabilise TAKE, then again")
+        level = level_of(float(found.head.mean()), FEW, LONG)
+        cure = "facert stabilise TAKE OUT.h5 takes it out; then retarget that"
+        yield _reason("head motion", level, found.head, time, text, cure)
     if found.placed.any():
         what = "markers lie" if model.layout.kind == "markers" else "weights are"
         text = f"{what} elsewhere throughout ({most(found.offset, names)})"
         cure = "another day or actor: --neutral FRAMES, in which the face rests"
-        yield _by_share("far from training", found.placed, time, text, cure)
+        much = float(over_names(found.offset[None])[0]) > NEW
+        level = level_of(float(found.placed.mean()), FEW, MANY if much else np.inf)
+        yield _reason("far from training", level, found.placed, time, text, cure)
     if found.new.any():
         amounts = np.mean(found.left[found.new] ** 2, axis=0)
         text = f"the face does what no posed frame showed (mostly {most(amounts, names)})"
         cure = "facert suggest TAKE --have MODEL names frames to pose; train on both takes"
-        yield _by_share("new expressions", found.new, time, text, cure)
+        level = level_of(float(found.new.mean()), FEW, MANY)
+        yield _reason("new expressions", level, found.new, time, text, cure)
 
 
-def _by_share(kind: str, mask: BoolArray, time: FloatArray, text: str, cure: str) -> Reason:
-    """The reason of a mask of frames (T,), by its share."""
-    level = level_of(float(mask.mean()), FEW, MANY)
+def _noise(result: Take, model: TrainedModel) -> Iterator[Reason]:
+    """The reason of a source whose noise could not be taken out."""
+    if result.source.std is None:
+        return
+    left = np.nanmedian(result.source.std, axis=0) / model.source_units.scale
+    left = np.sqrt(np.mean(left.reshape(len(left), -1) ** 2, axis=1))
+    amount = float(np.sqrt(np.nanmean(left**2)))
+    if amount > NOISY:
+        names = most(np.nan_to_num(left), model.layout.names)
+        text = f"noise that is left is {amount:.0%} of the motion (most in {names})"
+        cure = "fine motion is lost: a better solve in the tracker helps, more poses do not"
+        yield Reason("noise", "look at it", text, cure, np.empty(0, dtype=np.int64))
+
+
+def _reason(
+    kind: str, level: Level, mask: BoolArray, time: FloatArray, text: str, cure: str
+) -> Reason:
+    """The reason of a mask of frames (T,)."""
     return Reason(kind, level, f"{text} {found_in(mask, time)}", cure, np.flatnonzero(mask))
 
 
@@ -163,9 +197,8 @@ def _of_recording(take: Take, model: TrainedModel, detect: bool) -> Iterator[Rea
     """Reasons in what was observed: bad values, and frames that show too little."""
     source = model.layout.columns(take.source.names, quiet=True).arrange(take.source)
     bad = _bad(take, source, model) if detect else np.zeros(source.valid.shape, dtype=np.bool_)
-    noun = source.kind[:-1]
-    if bad.any():
-        shares = bad.mean(axis=0)
+    noun, shares = source.kind[:-1], bad.mean(axis=0)
+    if shares.max() >= OFTEN:
         mask = np.asarray(bad.any(axis=1))
         names = most(shares, source.names)
         text = f"bad values hidden, {bad.mean():.1%} of all (mostly {names}) "

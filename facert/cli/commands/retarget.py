@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from facert.cli.shared import console
-from facert.cli.shared.batch import carry_out, plan
+from facert.cli.shared.batch import Plan, carry_out, plan
+from facert.cli.shared.files import write_beside
 from facert.cli.shared.options import (
     CONTROLS,
     DEFAULT_MODEL,
@@ -23,15 +25,19 @@ from facert.cli.shared.options import (
     TARGET,
     MappingOptions,
     argument,
+    file_option,
     option,
 )
+from facert.cli.shared.verdicts import print_verdicts, save_verdicts
 from facert.data.text import plural
-from facert.errors import reading
+from facert.errors import InputError, reading
+from facert.io.registry import OWN_ENDINGS, require_replaceable
 
 Mode = Literal["offline", "online"]
 
 if TYPE_CHECKING:
     from facert.data.take import Take
+    from facert.data.verdict import Verdict
     from facert.retarget.retargeter import Retargeter
 
 
@@ -69,13 +75,21 @@ def command(
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
     jobs: JOBS = None,
+    json_path: Annotated[
+        Path | None, file_option("The verdicts, for programs.", "--json", metavar="FILE")
+    ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:
     """Write the character's parameters for every frame of a take.
 
+    In the end each take gets a verdict: good, look at it, or bad, with the reasons, where they are,
+    and what helps.
+
     facert retarget facert-demo/performance.h5 retargeted.h5
     facert retarget facert-demo/training.h5 --out-dir results --ending .csv
     """
+    if json_path is not None:
+        require_replaceable(json_path, overwrite)
     todo = plan(paths, out_dir, ending, jobs, overwrite)
     options = MappingOptions(controls, no_detect, no_smooth, sigma, neutral)
     work = partial(
@@ -88,7 +102,29 @@ def command(
         device=device,
         overwrite=overwrite,
     )
-    carry_out(todo, work, overwrite)
+    carry_out(todo, work, overwrite, partial(_conclude, todo, model, json_path, overwrite))
+
+
+def _conclude(
+    todo: Plan, model: Path, json_path: Path | None, overwrite: bool, done: Mapping[Path, Verdict]
+) -> None:
+    """Show the verdict of each take, also of those that were there already."""
+    verdicts = {pair: done.get(pair[0]) or _kept(pair[1]) for pair in todo.pairs}
+    known = {pair: verdict for pair, verdict in verdicts.items() if verdict is not None}
+    print_verdicts(known, model, todo.many)
+    if json_path is not None:
+        save_verdicts(known, model, json_path, overwrite)
+
+
+def _kept(result: Path) -> Verdict | None:
+    """The verdict in a result that is there."""
+    from facert.io.verdict import read_verdict
+
+    try:
+        there = result.is_file() and result.suffix.lower() in OWN_ENDINGS
+        return read_verdict(result) if there else None
+    except InputError:
+        return None
 
 
 def _retarget(
@@ -102,27 +138,31 @@ def _retarget(
     drop: bool,
     device: str,
     overwrite: bool,
-) -> None:
-    """Retarget one take and report its error."""
+) -> Verdict:
+    """Retarget one take, report its error, and judge it."""
     import time
 
     import facert
     from facert.cli.shared.kept_corrections import with_kept
     from facert.data.labelling import without_predicted
     from facert.io.formats import read_source_file
+    from facert.io.verdict import beside_result
 
     retargeter = _loaded(model.resolve(), _stamp(model))
     take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
+    chosen = options(retargeter)
     with reading(source):
-        result = retargeter.retarget(take, mode, options(retargeter), device)
+        result = retargeter.retarget(take, mode, chosen, device)
     seconds = time.perf_counter() - began
     made = result if drop else with_kept(result, source, take, output)
-    facert.write_take(made, output, overwrite)
+    verdict = facert.judge(take, made, retargeter, chosen)
+    write_beside(made, output, overwrite, beside_result(verdict))
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.show(f"wrote {output}")
     _print_error(without_predicted(take), result, retargeter)
+    return verdict
 
 
 @lru_cache(maxsize=1)

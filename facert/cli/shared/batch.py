@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar
 
 import typer
 
 from facert.cli.shared import console
 from facert.cli.shared.files import identity, require_other_file
 from facert.cli.shared.in_and_out import SWAPPED, require_in_and_out
+from facert.data.subject import about
 from facert.errors import FacertError, InputError, OutputExistsError, OutputKeptError
 from facert.evaluation.processes import call_each, cores
-from facert.io.registry import Kind, format_of, output_format, require_replaceable
+from facert.io.registry import Kind, output_format, require_replaceable
 
-Work = Callable[[Path, Path], None]
-"""Makes one file from another; must be picklable where there are several jobs."""
+Thing = TypeVar("Thing")
+Work = Callable[[Path, Path], Thing]
+"""Makes one file from another, and returns what is to be said of it in the end; must be picklable
+where there are several jobs."""
 
 
 @dataclass(frozen=True)
@@ -88,18 +92,31 @@ def _require_kept(outputs: Sequence[Path], others: Sequence[Path | None]) -> Non
                 require_other_file(other, output, str(other))
 
 
-def carry_out(todo: Plan, work: Work, overwrite: bool) -> None:
-    """Carry out a plan, several files at a time if asked; exits with status 1 if any failed."""
+def carry_out(
+    todo: Plan,
+    work: Work[Thing],
+    overwrite: bool,
+    conclude: Callable[[Mapping[Path, Thing]], object] | None = None,
+) -> None:
+    """Carry out a plan, several files at a time if asked; exits with status 1 if any failed.
+
+    Before that, `conclude` is given what the work returned, by the sources that were done.
+    """
+    done: dict[Path, Thing] = {}
+    failed = there = 0
     if not todo.many:
-        work(*todo.pairs[0])
-        return
-    wanted, failed = _writable(todo.pairs, overwrite)
-    there = len(todo.pairs) - len(wanted) - failed
-    for file, error in call_each(
-        _attempt, [(work, *pair) for pair in wanted], todo.jobs, partial(_begin, console.log.level)
-    ):
-        failed += error is not None
-        console.show(f"failed  {error}" if error else f"done    {file}")
+        done[todo.pairs[0][0]] = work(*todo.pairs[0])
+    else:
+        wanted, failed = _writable(todo.pairs, overwrite)
+        there = len(todo.pairs) - len(wanted) - failed
+        calls, begin = [(work, *pair) for pair in wanted], partial(_begin, console.log.level)
+        for file, thing, error in call_each(_attempt, calls, todo.jobs, begin):
+            failed += error is not None
+            console.show(f"failed  {error}" if error else f"done    {file}")
+            if error is None:
+                done[file] = thing
+    if conclude is not None:
+        conclude(done)
     if failed:
         left = f", {there} {'exists' if there == 1 else 'exist'} already" if there else ""
         console.err.print(f"{failed} of {len(todo.pairs)} files failed{left}", style="red")
@@ -150,27 +167,30 @@ def _begin(level: int) -> None:
     console.log.setLevel(level)
 
 
-def _attempt(work: Work, source: Path, output: Path) -> tuple[Path, str | None]:
-    """Do the work on one file; return it with its error in one line, or with None."""
+def _attempt(work: Work[Any], source: Path, output: Path) -> tuple[Path, Any, str | None]:
+    """Do the work on one file; return it, what the work returned, and its error in one line.
+
+    Whatever is logged meanwhile names the file.
+    """
     try:
-        work(source, output)
+        with about(str(source)):
+            return source, work(source, output), None
     except FacertError as error:
         text = str(error)
     except OSError as error:
         text = error.strerror or str(error)
     except Exception as error:  # whatever is wrong with one file, the others are done
         text = f"unexpected {type(error).__name__}: {error}"
-    else:
-        return source, None
-    return source, text if str(source) in text else f"{source}: {text}"
+    return source, None, text if str(source) in text else f"{source}: {text}"
 
 
 def _files(path: Path) -> list[Path]:
     """A file, or the takes in a folder."""
     if not path.is_dir():
         return [path]
-    files = (file for file in path.iterdir() if file.is_file())
-    found = sorted(file for file in files if format_of(file, "read", "take"))
+    from facert.io.folder import takes_in  # NumPy, which --help does without
+
+    found = takes_in(path)
     if not found:
         raise InputError("the folder", "takes", "none", "Give a folder with takes.", str(path))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from facert.cli.shared import console
 from facert.errors import InputError, reading
@@ -13,10 +13,10 @@ from facert.io.registry import require_replaceable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from facert.data.moments import Timed
     from facert.data.take import Take
+    from facert.io.take import Beside
     from facert.io.video_frames import VideoFrames
     from facert.render.faces import Face
 
@@ -123,10 +123,8 @@ def open_footage(
     return None if path is None else open_video(path, take, start, pixels)
 
 
-def write_beside(
-    take: Take, output: Path, overwrite: bool, beside: Mapping[str, NDArray[Any]]
-) -> None:
-    """Write a take, and beside it what only HDF5 can hold."""
+def write_beside(take: Take, output: Path, overwrite: bool, beside: Beside) -> None:
+    """Write a take, and beside it what only HDF5 can hold, with a note where it cannot."""
     from facert.io.formats import write_take_file
     from facert.io.registry import OWN_ENDINGS
     from facert.io.take import write_take
@@ -135,7 +133,8 @@ def write_beside(
         write_take(take, output, overwrite, beside)
         return
     write_take_file(take, output, overwrite)
-    console.log.info("only a .h5 file would hold %s as well", " and ".join(beside))
+    what = dict.fromkeys("the verdict" if "/verdict/" in name else name for name in beside)
+    console.log.info("only a .h5 file would hold %s as well", " and ".join(what))
 
 
 def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
