@@ -79,11 +79,9 @@ FORMATS = (
         writes="poses (else source weights), if they are ARKit's; rows are even in time",
     ),
     Format(
-        (".curvetable.csv", ".curvetable.json"),
-        read={"take": "tables.curve_table.read_curve_table"},
+        (".curvetable.csv", ".curvetable.json"),  # read as .csv and .json: their content decides
         write={"take": "tables.curve_table.write_curve_table"},
         mark="tables.curve_table.bears_mark",
-        about=" of Unreal",
         reads="a Curve Table of Unreal: a row a curve, a column a time",
         writes="poses (else source weights) as a Curve Table",
     ),

@@ -64,7 +64,7 @@ def test_poses_come_before_the_source(tmp_path: Path) -> None:
 
 
 def test_a_table_that_unreal_exported_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "unreal.curvetable.csv"
+    path = tmp_path / "unreal.csv"
     path.write_text("---,0.000000,0.033333\nJawOpen,0.1,0.2\nSmile,0.3,0.4\n")
     read = read_any(path, kind="take")
     assert isinstance(read, Take)
@@ -106,9 +106,7 @@ def test_times_that_are_one_in_single_precision_are_refused(tmp_path: Path) -> N
         ("a.curvetable.csv", "---,zero,one\njaw,0,1\n"),
         ("a.curvetable.csv", "---,0,1\njaw,0\n"),
         ("a.curvetable.csv", "---,0,1\njaw,0,open\n"),
-        ("a.curvetable.json", '{"Name": "jaw"}'),
-        ("a.curvetable.json", '[{"0": 1.0}]'),
-        ("a.curvetable.json", '[{"Name": "jaw", "zero": 1.0}]'),
+        ("a.curvetable.json", '[{"Name": "jaw", "0": "open"}]'),
     ],
 )
 def test_what_is_no_curve_table_is_named(tmp_path: Path, name: str, text: str) -> None:

@@ -41,6 +41,7 @@ from facert.io.lines import (
     to_numbers,
 )
 from facert.io.tables.coordinates import markers_among
+from facert.io.tables.curve_table import is_curve_table, read_csv_curves
 from facert.io.tables.livelink import is_livelink, read_livelink
 from facert.io.tables.marker_header import marker_header
 from facert.io.tables.table import Table, is_number, is_text, table_of_lines
@@ -60,13 +61,15 @@ _NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 def read_csv_take(
     path: Path, fps: float | None = None, keep: Sequence[str] = (), sparse: bool = False
 ) -> Take:
-    """Read a CSV file by its header: one of Live Link Face, or else a table; see `read_table`."""
+    """Read a CSV file by its header: of Live Link Face, of Unreal, or a table; see `read_table`."""
     with reading(path):
         header = read_header(path)
-        if not is_livelink(header):
-            return read_table(path, fps, keep, sparse)
-        require_there(keep, header)
-        return learnable(read_livelink(path, fps), keep, sparse)
+        if is_livelink(header):
+            require_there(keep, header)
+            return learnable(read_livelink(path, fps), keep, sparse)
+        if header and is_curve_table(header):
+            return read_csv_curves(read_text(path))
+        return read_table(path, fps, keep, sparse)
 
 
 def read_table(

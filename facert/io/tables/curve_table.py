@@ -14,6 +14,7 @@ import csv
 import io
 import json
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +24,14 @@ from facert.data.arrays import FloatArray
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.version import CREATED_BY, MARK
-from facert.errors import InputError, reading
+from facert.errors import InputError
 from facert.io.atomic import replacing
-from facert.io.guarded import read_beginning, read_text
+from facert.io.guarded import read_beginning
 from facert.io.lines import check_width, parse_csv, to_numbers
-from facert.io.tables.json_frames import parsed
 
 _DROPPED = re.compile("[\"' ,\n\r\t]")
 _NAME = "Name"
+_TIME = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _MARK = re.compile(rf'{MARK}\d[^,\n]*,|\[\{{"{_NAME}" : '.encode())
 
 
@@ -52,17 +53,56 @@ def write_curve_table(take: Take, path: Path, overwrite: bool = False) -> None:
         temporary.write_text(text, encoding="utf-8", newline="")
 
 
-def read_curve_table(path: Path) -> Take:
-    """Read a Curve Table as a take whose source is weights.
+def is_curve_table(header: Sequence[str]) -> bool:
+    """Whether a CSV file with this header is a Curve Table of Unreal's or facert's."""
+    return header[0] == "---" or re.match(rf"{MARK}\d", header[0]) is not None
+
+
+def is_json_curve_table(document: Any) -> bool:
+    """Whether a JSON file with this content is a Curve Table."""
+    return (
+        isinstance(document, list)
+        and bool(document)
+        and all(isinstance(row, dict) and isinstance(row.get(_NAME), str) for row in document)
+        and all(_TIME.fullmatch(key) for row in document for key in row if key != _NAME)
+    )
+
+
+def read_csv_curves(text: str) -> Take:
+    """The take of weights that a Curve Table in CSV is.
 
     Raises `InputError` naming the row or cell that is at fault.
     """
-    with reading(path):
-        is_json = path.suffix.lower() == ".json"
-        names, time, values = _read_json(path) if is_json else _read_csv(path)
-        order = np.argsort(time)
-        fps = nominal_rate(time[order])
-        return Take(time[order], Source(values[order], names), fps=fps)
+    header, rows = parse_csv(text, ",")
+    check_width(rows, header)
+    try:
+        time = np.array([float(cell) for cell in header[1:]])
+    except ValueError:
+        found, fix = ", ".join(header[1:4]), "Write a row a curve, and a column a time."
+        raise InputError("header", "times in seconds", found, fix) from None
+    values = to_numbers(rows, header, range(1, len(header)))
+    return _take(tuple(row.cells[0] for row in rows), time, values.T)
+
+
+def take_of_json_curves(rows: Sequence[Mapping[str, Any]]) -> Take:
+    """The take of weights that a Curve Table in JSON is.
+
+    Raises `InputError` for a value that is no number.
+    """
+    curves = [{float(key): row[key] for key in row if key != _NAME} for row in rows]
+    time = sorted({when for curve in curves for when in curve})
+    values = [[curve.get(when, np.nan) for curve in curves] for when in time]
+    odd = next((v for row in values for v in row if isinstance(v, bool | str | list | dict)), None)
+    if odd is not None:
+        raise InputError("values", "a number at each time", repr(odd)[:40], "Export it again.")
+    names = tuple(str(row[_NAME]) for row in rows)
+    numbers = np.array(values, dtype=np.float64).reshape(len(time), len(names))
+    return _take(names, np.array(time), numbers)
+
+
+def _take(names: tuple[str, ...], time: FloatArray, values: FloatArray) -> Take:
+    order = np.argsort(time)
+    return Take(time[order], Source(values[order], names), fps=nominal_rate(time[order]))
 
 
 def bears_mark(path: Path) -> bool:
@@ -102,30 +142,3 @@ def _json(names: tuple[str, ...], time: list[str], values: FloatArray) -> str:
     curves = [{when: v for when, v in row.items() if v == v} for row in known]
     rows = [{_NAME: name, **curve} for name, curve in zip(names, curves, strict=True)]
     return json.dumps(rows).replace(f'"{_NAME}": ', f'"{_NAME}" : ', 1).replace("}, {", "},\n{")
-
-
-def _read_csv(path: Path) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    header, rows = parse_csv(read_text(path), ",")
-    check_width(rows, header)
-    columns = range(1, len(header))
-    try:
-        time = np.array([float(cell) for cell in header[1:]])
-    except ValueError:
-        found, fix = ", ".join(header[1:4]), "Write a row a curve, and a column a time."
-        raise InputError("header", "times in seconds", found, fix) from None
-    values = to_numbers(rows, header, columns)
-    return tuple(row.cells[0] for row in rows), time, values.T
-
-
-def _read_json(path: Path) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    rows: Any = parsed(read_text(path))
-    try:
-        names = tuple(str(row.pop(_NAME)) for row in rows)
-        curves = [{float(key): float(value) for key, value in row.items()} for row in rows]
-    except (AttributeError, KeyError, TypeError, ValueError):
-        found, fix = "something else", "Export it as JSON from Unreal."
-        expected = f'objects with "{_NAME}" and numbers by time'
-        raise InputError("file", expected, found, fix) from None
-    time = sorted({when for curve in curves for when in curve})
-    values = [[curve.get(when, np.nan) for curve in curves] for when in time]
-    return names, np.array(time), np.array(values).reshape(len(time), len(names))

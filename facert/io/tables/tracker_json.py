@@ -24,6 +24,7 @@ from facert.data.text import listed, plural
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
+from facert.io.tables.curve_table import is_json_curve_table, take_of_json_curves
 from facert.io.tables.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
 from facert.io.tables.table import Table
 from facert.io.tables.table_take import Reading, take_of_table
@@ -56,6 +57,8 @@ def read_json_take(
         if _are_curves(document):
             take = take_of_curves(document, fps)
             return take if _OWN.match(text) else learnable(take, keep, sparse)
+        if is_json_curve_table(document):
+            return take_of_json_curves(document)
         table = _table(_or_points(frames_of(document)))
         return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep), sparse))
 
