@@ -21,6 +21,8 @@ class DrivenNodes:
     """N nodes, moved by P controls, and V vertices that follow them."""
 
     names: tuple[str, ...]
+    controls: tuple[str, ...]
+    """Names of those that have a driver, as in its table."""
     above: tuple[int, ...]
     """The nearest driven node above each, -1 for none; it stands before those below it."""
     frames: FloatArray

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -24,7 +25,11 @@ from facert.data.arrays import (
     require_time,
     set_fields,
 )
+from facert.data.driven_nodes import DrivenNodes
 from facert.errors import InputError
+
+CLAY = (0.80, 0.72, 0.66)
+"""What is shown without colours of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +127,8 @@ class Shaped(Protocol):
 class Rig:
     """A face mesh with linear shapes: vertices = neutral + sum_p params_p * shapes_p.
 
+    A character may have more to show: meshes that no shape moves, and nodes that controls turn.
+
     Parameters
     ----------
     neutral : array, shape (V, 3)
@@ -136,6 +143,11 @@ class Rig:
         Unit of length; empty when unknown.
     colours : array, shape (V, 3), optional
         Red, green and blue of every vertex, 0 to 1; for pictures only.
+    body : Mesh, optional
+        What no shape moves: eyeballs, teeth, hair, neck; for pictures only.
+    driven : DrivenNodes, optional
+        Bones that controls turn or shift, with all vertices, those of the body last; for pictures
+        only. The shape of a control that does nothing else is 0.
     """
 
     neutral: FloatArray
@@ -144,6 +156,8 @@ class Rig:
     faces: IntArray
     units: str = ""
     colours: FloatArray | None = None
+    body: Mesh | None = None
+    driven: DrivenNodes | None = None
 
     def __post_init__(self) -> None:
         mesh = Mesh(self.neutral, self.faces, self.units, self.colours)
@@ -157,10 +171,30 @@ class Rig:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh in the rest pose."""
+        """The mesh of the shapes in the rest pose."""
         return Mesh(self.neutral, self.faces, self.units, self.colours)
 
+    @cached_property
+    def whole(self) -> Mesh:
+        """All that is to be seen in the rest pose: the mesh of the shapes, then the body."""
+        if self.body is None:
+            return self.mesh
+        faces = np.concatenate([self.faces, self.body.faces + len(self.neutral)])
+        vertices = np.concatenate([self.neutral, self.body.vertices])
+        return Mesh(vertices, faces, self.units, self._all_colours())
+
+    def _all_colours(self) -> FloatArray | None:
+        if self.body is None or (self.colours is None and self.body.colours is None):
+            return self.colours
+        both = ((self.colours, self.neutral), (self.body.colours, self.body.vertices))
+        clay = [np.tile(CLAY, (len(at), 1)) if one is None else one for one, at in both]
+        return np.concatenate(clay)
+
     def deform(self, params: FloatArray) -> FloatArray:
-        """Vertices (T, V, 3) for parameters (T, P)."""
-        flat = self.shapes.reshape(len(self.shapes), -1)
-        return self.neutral + (np.asarray(params) @ flat).reshape(-1, *self.neutral.shape)
+        """Vertices (T, V, 3) of `whole` for parameters (T, P)."""
+        flat, params = self.shapes.reshape(len(self.shapes), -1), np.asarray(params)
+        vertices = self.neutral + (params @ flat).reshape(-1, *self.neutral.shape)
+        if self.body is not None:
+            body = np.broadcast_to(self.body.vertices, (len(vertices), *self.body.vertices.shape))
+            vertices = np.concatenate([vertices, body], axis=1)
+        return vertices if self.driven is None else self.driven.moved(vertices, params)

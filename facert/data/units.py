@@ -100,7 +100,14 @@ def checked_axis(name: str, field: str) -> str:
 def _moved(found: Take | Rig, matrix: FloatArray) -> Take | Rig:
     """Positions times a matrix that mixes no axes; weights have no place."""
     if isinstance(found, Rig):
-        return replace(found, neutral=found.neutral @ matrix.T, shapes=found.shapes @ matrix.T)
+        body, driven = found.body, found.driven
+        return replace(
+            found,
+            neutral=found.neutral @ matrix.T,
+            shapes=found.shapes @ matrix.T,
+            body=None if body is None else replace(body, vertices=body.vertices @ matrix.T),
+            driven=None if driven is None else driven.transformed(matrix),
+        )
     source = found.source
     if source.kind == "weights":
         return found

@@ -6,8 +6,9 @@ import logging
 from collections.abc import Sequence
 from inspect import signature
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+from facert.data.drivers import Drivers
 from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig
@@ -41,6 +42,7 @@ def read_any(
     keep: Sequence[str] = (),
     align: bool = False,
     sparse: bool = False,
+    drivers: Drivers | None = None,
 ) -> Take | Rig:
     """Read a take or a rig from any format.
 
@@ -62,6 +64,8 @@ def read_any(
         Move shapes into register with the neutral where they are meshes; else they are logged.
     sparse : bool
         Whether the rows of a foreign table or track are poses of single frames, far apart.
+    drivers : Drivers, optional
+        Of nodes of a rig in a glTF file.
 
     Raises
     ------
@@ -82,12 +86,15 @@ def read_any(
     if held == "take" and target:
         _require_targets(found, path)
     fps = None if fps is None else standard_rate(fps)
-    options = {"target": target, "shapes": shapes, "fps": fps or or_fps, "keep": keep}
-    options |= {"align": align, "sparse": sparse}
+    options: dict[str, Any] = {"target": target, "shapes": shapes, "fps": fps or or_fps}
+    options |= {"keep": keep, "align": align, "sparse": sparse, "drivers": drivers}
     taken = signature(reader).parameters.keys() & options.keys()
     if align and "align" not in taken:
         fix = "Leave it out: the shapes are displacements."
         raise InputError("--align-shapes", "a folder of OBJ files", held, fix, where=str(path))
+    if drivers is not None and "drivers" not in taken:
+        fix = "Leave it out: only these files have bones."
+        raise InputError("--drivers", "a .glb, .gltf or .vrm", path.name, fix, where=str(path))
     read: Take | Rig = reader(path, **{name: options[name] for name in taken})
     return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
 
@@ -145,6 +152,15 @@ def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
     return targets if len(targets) > 1 else {}
 
 
+def nodes_of(path: Path) -> tuple[str, ...]:
+    """Names of the nodes of a character that drivers may move; empty where there are none."""
+    found = format_of(Path(path), "read", "rig")
+    if found is None or not found.nodes:
+        return ()
+    nodes: tuple[str, ...] = function(found.nodes)(Path(path))
+    return nodes
+
+
 def targets_for(target: str | None, *paths: Path | None) -> list[str | None]:
     """The ``--target`` of each of several takes: it is for those that can have several targets.
 
@@ -172,7 +188,7 @@ def read_source_file(path: Path, target: str | None = None, controls: Sequence[s
     return read_take_file(path, target)
 
 
-def read_rig_file(path: Path, shapes: str | None = None) -> Rig:
+def read_rig_file(path: Path, shapes: str | None = None, drivers: Drivers | None = None) -> Rig:
     """Read a rig from any format; see `read_any`.
 
     Raises
@@ -180,7 +196,7 @@ def read_rig_file(path: Path, shapes: str | None = None) -> Rig:
     InputError
         Also when the file holds a take.
     """
-    found = read_any(path, shapes=shapes, kind="rig")
+    found = read_any(path, shapes=shapes, kind="rig", drivers=drivers)
     if isinstance(found, Take):
         raise InputError("file", "a rig", "a take", "Give a rig.", where=str(path))
     return found

@@ -40,6 +40,8 @@ class Format:
     """From the path, and the kind that was asked for or None, to what that very file holds."""
     targets: str = ""
     """From the path to the targets of a take in it, and the controls of each."""
+    nodes: str = ""
+    """From the path to the names of nodes in it that drivers may move."""
     missing: Missing = ""
     """What stands for missing frames where a file is played row by row at its rate, so that rows
     have to be even: the frame before, or a row that says so; empty where rows have their times."""
@@ -134,6 +136,7 @@ FORMATS = (
             "mesh": "gltf.rig.read_gltf_mesh",
         },
         kind_of="gltf.take.kind_of",
+        nodes="gltf.driven.nodes_of",
         reads="a rig of morph targets, at rest as the scene and its skeleton place it; their "
         "animation as a take",
     ),
@@ -141,6 +144,7 @@ FORMATS = (
         (".vrm",),
         read={"take": "gltf.take.read_gltf_take", "rig": "gltf.rig.read_gltf_rig"},
         kind_of="gltf.take.kind_of",
+        nodes="gltf.driven.nodes_of",
         reads="the same of a VRM avatar; with `--shapes expressions` its expressions",
     ),
     Format(

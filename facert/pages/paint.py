@@ -12,8 +12,7 @@ from html import escape
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.rig import Mesh
-from facert.render.shade import CLAY
+from facert.data.rig import CLAY, Mesh
 
 MOST = 24  # colours of a face
 LEVELS = 10  # of a scale

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.drivers import require_used
 from facert.data.names import shape_drivers
 from facert.data.rig import Rig
 from facert.pages.paint import skin
@@ -34,14 +35,15 @@ class PoseStage:
         self, server: ViserServer, rig: Rig, session: PosingSession, actor: Face | None
     ) -> None:
         self._rig, self._drivers = rig, shape_drivers(session.controls.names, rig.names)
+        if rig.driven is not None:
+            require_used(rig.driven.controls, session.controls.names)
         self._stage = Stage(server, BAR)
         source = None if session.take is None else session.take.source
         self._actor = ActorParts(server, self._stage, source, actor)
-        own = skin(rig.mesh)
-        self._character = self._stage.add(FacePart(server, "character", rig.mesh, own))
-        self._samples = [
-            FacePart(server, f"other {number}", rig.mesh, own) for number in range(1, SAMPLES + 1)
-        ]
+        mesh = (rig.whole, skin(rig.whole), len(rig.neutral))
+        self._character = self._stage.add(FacePart(server, "character", *mesh))
+        others = range(1, SAMPLES + 1)
+        self._samples = [FacePart(server, f"other {number}", *mesh) for number in others]
         for part in self._samples:
             part.root.visible = False
             self._stage.add(part, row=1)

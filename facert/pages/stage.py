@@ -100,10 +100,19 @@ class FacePart(Part):
         At rest.
     own : Paint
         Its own colours, see `facert.pages.paint.skin`; the same for all parts of one rig.
+    subject : int, optional
+        So many vertices, the first, are what it is scaled and placed by; all by default.
     """
 
-    def __init__(self, server: ViserServer, label: str, mesh: Mesh, own: Paint) -> None:
-        super().__init__(server, label, mesh.vertices)
+    def __init__(
+        self,
+        server: ViserServer,
+        label: str,
+        mesh: Mesh,
+        own: Paint,
+        subject: int | None = None,
+    ) -> None:
+        super().__init__(server, label, mesh.vertices[:subject])
         self._faces, self._own = mesh.faces, own
         self._caps = caps_of(mesh.vertices, mesh.faces)
         self._applied: Paint | None = None
@@ -289,7 +298,7 @@ class ActorParts:
 def face_part(server: ViserServer, face: Face, own: Paint | None = None) -> FacePart:
     """The part of a face, in its own colours (see `skin`) unless others are given."""
     neutral = face.motion.neutral
-    return FacePart(server, face.label, neutral, own or skin(neutral))
+    return FacePart(server, face.label, neutral, own or skin(neutral), face.subject)
 
 
 def _bytes(colour: FloatArray) -> tuple[int, int, int]:

@@ -113,7 +113,8 @@ class Performance:
             return None
         drivers = shape_drivers(self.take.controls.names, self.rig.names)
         shapes = np.tensordot(drivers, self.rig.shapes, axes=1)
-        return np.asarray(np.sum(shapes**2, axis=2))
+        body = len(self.rig.whole.vertices) - len(self.rig.neutral)
+        return np.pad(np.sum(shapes**2, axis=2), ((0, 0), (0, body)))
 
     def scale(self) -> Scale:
         """The scale of colours for `vertex_errors`, else for `vertex_std`."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.drivers import require_used
 from facert.data.names import NameIndex, shape_drivers
 from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Take
@@ -37,6 +38,8 @@ class Face:
     motion: MeshSequence
     blank: str = "no pose"
     """What is written where a frame has no vertices."""
+    subject: int | None = None
+    """So many vertices, the first, are what a camera frames; all by default."""
 
     def picture(self, vertices: FloatArray, camera: Camera, pixels: int) -> FloatArray | None:
         """The face with these vertices (V, 3), RGBA (pixels, pixels, 4); None if any is NaN."""
@@ -52,12 +55,13 @@ def frame_faces(faces: Sequence[Face], frames: Sequence[int]) -> list[Camera]:
     Each is as large as its neutral allows; all shrink alike when one needs more room, so that
     faces beside each other stay comparable.
     """
-    cameras = [frame_mesh(face.motion.neutral.vertices, TURN) for face in faces]
+    cameras = [frame_mesh(face.motion.neutral.vertices[: face.subject], TURN) for face in faces]
     some = np.asarray(frames)[:: max(1, len(frames) // _LOOKED_AT)]
     needed = 1.0
     for face, camera in zip(faces, cameras, strict=True):
         for vertices in face.motion.fetch(some):
-            off = np.abs(camera.project(vertices, 2)[:, :2] - 0.5).max()  # 1 at the border
+            seen = camera.project(vertices[: face.subject], 2)[:, :2]
+            off = np.abs(seen - 0.5).max()  # 1 at the border
             needed = max(needed, 0.0 if np.isnan(off) else off)
     room = min(1.02 * needed, _MOST_ROOM) if needed > 1 else 1.0
     return [replace(camera, reach=room * camera.reach) for camera in cameras]
@@ -76,8 +80,8 @@ def posed_face(take: Take, rig: Rig, label: str) -> Face:
     def fetch(frames: IntArray) -> FloatArray:
         return rig.deform(settings[frames])
 
-    motion = MeshSequence(rig.mesh, take.time, fetch, take.fps, take.start_timecode)
-    return Face(label, motion)
+    motion = MeshSequence(rig.whole, take.time, fetch, take.fps, take.start_timecode)
+    return Face(label, motion, subject=len(rig.neutral))
 
 
 def actor_face(take: Take, rig: Rig) -> Face:
@@ -100,9 +104,9 @@ def actor_face(take: Take, rig: Rig) -> Face:
 def driven_face(take: Take, rig: Rig, weights: FloatArray) -> Face:
     """The face of a take's actor: a rig with weights (T, K), NaN where nothing was observed."""
     motion = MeshSequence(
-        rig.mesh, take.time, lambda rows: rig.deform(weights[rows]), take.fps, take.start_timecode
+        rig.whole, take.time, lambda rows: rig.deform(weights[rows]), take.fps, take.start_timecode
     )
-    return Face(ACTOR, motion, "not tracked")
+    return Face(ACTOR, motion, "not tracked", len(rig.neutral))
 
 
 def drives(rig: Rig, names: Sequence[str]) -> bool:
@@ -137,6 +141,8 @@ def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
     """
     poses, controls = require_poses(take), take.controls
     assert controls is not None  # poses come with controls
+    if rig.driven is not None:
+        require_used(rig.driven.controls, controls.names)
     return np.asarray(poses[np.asarray(frames)] @ shape_drivers(controls.names, rig.names))
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.ndimage import binary_fill_holes, uniform_filter
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.rig import CLAY
 from facert.mesh.normals import vertex_normals
 from facert.render.raster import Surface, rasterise
 
-CLAY = (0.80, 0.72, 0.66)
 DARK = np.array([0.13, 0.05, 0.05])  # the inside of a mesh, as seen through an open mouth
 VIEW = np.array([0.0, 0.0, 1.0])
 KEY_LIGHT = np.array([-0.42, 0.52, 0.74])

@@ -46,7 +46,7 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
 
         return {"kind": "model", **load(path).facts}
     from facert.data.facts import facts_of
-    from facert.io.formats import read_any, targets_of
+    from facert.io.formats import nodes_of, read_any, targets_of
     from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
     from facert.io.npz import NO_TARGET
 
@@ -56,6 +56,8 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
     targets = targets_of(path) if target is None else {}
     found = read_any(path, target=NO_TARGET if targets else target, shapes=shapes, fps=None)
     facts = facts_of(found)
+    if facts["kind"] == "rig" and (nodes := nodes_of(path)):
+        facts["nodes"] = nodes
     if targets:
         console.log.info("several targets: --target shows one of them")
         facts["controls_of_targets"] = {name: len(controls) for name, controls in targets.items()}

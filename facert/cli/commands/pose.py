@@ -13,6 +13,7 @@ from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     ACTOR,
     DEFAULT_MODEL,
+    DRIVERS,
     HOST,
     OVERWRITE,
     PORT,
@@ -78,6 +79,7 @@ def command(
         bool, option("Pose in the browser, with sliders; with --rig, --take, --actor.", "--view")
     ] = False,
     rig: RIG = None,
+    drivers: DRIVERS = None,
     take: Annotated[Path | None, file_option("The recording to pose, for --view.")] = None,
     actor: ACTOR = None,
     shapes: SHAPES = None,
@@ -92,7 +94,7 @@ def command(
     if view:
         from facert.cli.shared.pose_view import Files, open_page
 
-        files = Files(rig, take, model, actor, output, target, shapes)
+        files = Files(rig, drivers, take, model, actor, output, target, shapes)
         return open_page(files, overwrite, host, port)
     if not wanted:
         raise typer.BadParameter("give values with --set NAME=VALUE, or --view for sliders")

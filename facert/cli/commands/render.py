@@ -14,12 +14,14 @@ from facert.cli.shared.files import (
     actor_file,
     open_footage,
     read_actor,
+    read_character,
     require_name,
     save_picture,
 )
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     ACTOR,
+    DRIVERS,
     OVERWRITE,
     RIG,
     SHAPES,
@@ -46,6 +48,7 @@ def command(
     path: Annotated[Path, argument("FILE", "A take, or a mesh sequence.")],
     output: Annotated[Path, argument("OUT", "A sheet (.png, .pdf, .svg) or a clip (.mp4, .gif).")],
     rig_path: RIG = None,
+    drivers_path: DRIVERS = None,
     truth_path: Annotated[
         Path | None, file_option("The true poses, or the true mesh sequence.", "--truth")
     ] = None,
@@ -76,15 +79,16 @@ def command(
     facert render retargeted.h5 face.gif --rig facert-demo/character.h5 --size 96
     """
     from facert.errors import reading
-    from facert.io.formats import read_rig_file, targets_for
+    from facert.io.formats import targets_for
 
-    require_inputs(path, rig_path, truth_path, actor_file(actor_path), video_path, *(beside or []))
+    require_inputs(path, rig_path, drivers_path, truth_path)
+    require_inputs(actor_file(actor_path), video_path, *(beside or []))
     require_name(output, overwrite, (*PICTURES, *CLIP_RATES))
     wanted, others = _parse(frames), [(one, one.stem) for one in beside or []]
     others += [(truth_path, "truth")] if truth_path else []
     if len(others) >= MOST:
         raise typer.BadParameter(f"at most {MOST} faces fit on a picture")
-    rig = read_rig_file(rig_path, shapes) if rig_path else None
+    rig = read_character(rig_path, shapes, drivers_path)
     ours, *theirs = targets_for(target, path, *(one for one, _ in others))
     with ExitStack() as stack, reading(path):
         faces, take = _own_faces(stack, path, rig, ours, (actor_path, shapes))

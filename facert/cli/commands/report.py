@@ -6,9 +6,18 @@ from pathlib import Path
 from typing import Annotated
 
 from facert.cli.shared import console
-from facert.cli.shared.files import require_name, save_text
+from facert.cli.shared.files import read_character, require_name, save_text
 from facert.cli.shared.in_and_out import require_inputs
-from facert.cli.shared.options import OVERWRITE, RIG, SHAPES, TARGET, TRUTH, argument, option
+from facert.cli.shared.options import (
+    DRIVERS,
+    OVERWRITE,
+    RIG,
+    SHAPES,
+    TARGET,
+    TRUTH,
+    argument,
+    option,
+)
 from facert.data.text import plural
 
 ENDINGS = (".html", ".htm")
@@ -23,6 +32,7 @@ def command(
         "report.html"
     ),
     rig_path: RIG = None,
+    drivers_path: DRIVERS = None,
     truth_path: TRUTH = None,
     title: Annotated[str, option("Stands above all.")] = "",
     shapes: SHAPES = None,
@@ -34,15 +44,15 @@ def command(
     facert report retargeted.h5 --rig facert-demo/character.h5
     facert report . -o whole-folder.html
     """
-    require_inputs(*results, rig_path, truth_path)
+    require_inputs(*results, rig_path, drivers_path, truth_path)
     require_name(output, overwrite, ENDINGS)
 
-    from facert.io.formats import read_rig_file, read_take_file
+    from facert.io.formats import read_take_file
     from facert.pages.report.folder import file_section, folder_sections
     from facert.pages.report.page import make_report, to_html
     from facert.pages.report.sections import Section
 
-    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
+    rig = read_character(rig_path, shapes, drivers_path)
     truth = read_take_file(truth_path, target) if truth_path is not None else None
     sections: list[Section] = []
     for path in results:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from facert.cli.shared.files import read_actor
+from facert.cli.shared.files import read_actor, read_character
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import (
     ACTOR,
+    DRIVERS,
     HOST,
     PORT,
     RIG,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 def command(
     path: Annotated[Path, argument("TAKE", "A take, or what retarget wrote.")],
     rig_path: RIG = None,
+    drivers_path: DRIVERS = None,
     truth_path: TRUTH = None,
     model: Annotated[
         Path | None, option("Retarget TAKE with this model first.", "--model", "-m")
@@ -48,7 +50,7 @@ def command(
     facert view facert-demo/performance.h5 --model model.safetensors
     """
     import facert
-    from facert.io.formats import read_rig_file, read_source_file, read_take_file, targets_for
+    from facert.io.formats import read_source_file, read_take_file, targets_for
     from facert.pages.server import address, page_server, require_viser
 
     require_viser()
@@ -60,7 +62,7 @@ def command(
         take = read_take_file(path, ours)
     else:
         take = read_source_file(path, ours, retargeter.controls.names)
-    rig = read_rig_file(rig_path, shapes) if rig_path is not None else None
+    rig = read_character(rig_path, shapes, drivers_path)
     truth = read_take_file(truth_path, theirs) if truth_path is not None else None
     with reading(path):
         performance = _performance(take, rig, truth, retargeter)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from facert.data.moments import Timed
+    from facert.data.rig import Rig
     from facert.data.take import Take
     from facert.io.take import Beside
     from facert.io.video_frames import VideoFrames
@@ -69,6 +70,26 @@ NO_ACTOR = Path("none")  # for --actor
 def actor_file(path: Path | None) -> Path | None:
     """The file of ``--actor``, None where there is none to read."""
     return None if path == NO_ACTOR and not path.exists() else path
+
+
+def read_character(
+    path: Path | None, shapes: str | None, drivers: Path | None = None
+) -> Rig | None:
+    """The character's rig, if it is given, with what its drivers move.
+
+    Raises
+    ------
+    InputError
+        When the drivers come without a rig, or do not fit it.
+    """
+    from facert.io.formats import read_rig_file
+    from facert.io.toml import read_drivers
+
+    if path is None and drivers is not None:
+        raise InputError("--drivers", "the rig that they move", "none", "Give it with --rig.")
+    if path is None:
+        return None
+    return read_rig_file(path, shapes, read_drivers(drivers) if drivers else None)
 
 
 def read_actor(take: Take, path: Path | None, shapes: str | None) -> Face | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import actor_file, read_actor, require_name
+from facert.cli.shared.files import actor_file, read_actor, read_character, require_name
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import DEFAULT_MODEL
@@ -27,6 +27,7 @@ class Files:
     """Files and names given to ``facert pose``."""
 
     rig: Path | None
+    drivers: Path | None
     take: Path | None
     model: Path | None
     actor: Path | None
@@ -37,7 +38,7 @@ class Files:
 
 def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
     """Serve the page until Ctrl-C."""
-    from facert.io.formats import read_rig_file, read_take_file
+    from facert.io.formats import read_take_file
     from facert.pages.server import address, page_server, require_viser
 
     require_viser()
@@ -45,8 +46,9 @@ def open_page(files: Files, overwrite: bool, host: str, port: int) -> None:
 
     if files.rig is None:
         raise typer.BadParameter("--view draws the character: give its rig with --rig")
-    require_inputs(files.rig, files.take, actor_file(files.actor))
-    rig = read_rig_file(files.rig, files.shapes)
+    require_inputs(files.rig, files.drivers, files.take, actor_file(files.actor))
+    rig = read_character(files.rig, files.shapes, files.drivers)
+    assert rig is not None  # as its file is given
     take = None if files.take is None else read_take_file(files.take, files.target)
     session = _session(files, rig, take, overwrite)
     actor = None if take is None else read_actor(take, files.actor, files.shapes)

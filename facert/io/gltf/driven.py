@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from facert.data.drivers import Driver, Drivers
 from facert.data.names import NameIndex, nearest
 from facert.data.text import listed, printable
 from facert.errors import InputError
-from facert.io.gltf.scene import Scene, local_parts, placed
+from facert.io.gltf.document import open_gltf
+from facert.io.gltf.scene import Scene, local_parts, placed, scene_of
 
 log = logging.getLogger("facert")
 
@@ -50,7 +52,7 @@ def driven_by(scene: Scene, shapes: tuple[str, ...], drivers: Drivers | None) ->
     if not nodes:
         return Driven(controls)
     _warn_of_skins(scene, nodes)
-    motion = _motion(scene, nodes, len(controls))
+    motion = _motion(scene, nodes, drivers, len(controls))
     for driver, node in moves:
         place = nodes.index(node)
         rotate = np.radians(driver.rotate) / len(columns[driver.control])
@@ -58,6 +60,15 @@ def driven_by(scene: Scene, shapes: tuple[str, ...], drivers: Drivers | None) ->
         motion.rotate[columns[driver.control], place] += rotate
         motion.translate[columns[driver.control], place] += translate / _scale(scene, node)
     return Driven(controls, nodes, motion)
+
+
+def nodes_of(path: Path) -> tuple[str, ...]:
+    """Names of the nodes of a file that drivers may move.
+
+    Raises `InputError` when the file cannot be read safely.
+    """
+    with open_gltf(path) as document:
+        return drivable(scene_of(document))
 
 
 def drivable(scene: Scene) -> tuple[str, ...]:
@@ -73,16 +84,12 @@ def drivable(scene: Scene) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in names if isinstance(name, str) and name))
 
 
-def with_shares(motion: DrivenNodes, shares: FloatArray) -> DrivenNodes:
-    """The nodes with the vertices that follow them, (V, N)."""
-    return replace(motion, shares=shares)
-
-
-def _motion(scene: Scene, nodes: Sequence[int], controls: int) -> DrivenNodes:
+def _motion(scene: Scene, nodes: Sequence[int], drivers: Drivers, controls: int) -> DrivenNodes:
     """These nodes, which nothing moves yet."""
     described = scene.document.root["nodes"]
     return DrivenNodes(
         names=tuple(str(described[node]["name"]) for node in nodes),
+        controls=drivers.controls,
         above=tuple(scene.above(scene.parents.get(node, -1), nodes) for node in nodes),
         frames=np.stack([_frame(scene, node) for node in nodes]),
         rotate=np.zeros((controls, len(nodes), 3)),
