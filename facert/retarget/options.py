@@ -69,7 +69,7 @@ class Adjustments:
                 near = nearest(unknown[0], ENTRIES)
                 fix = f"Did you mean {near}?" if near else "Remove it."
                 raise InputError(f"{name}.{unknown[0]}", expected, "another entry", fix)
-            columns = fitting_some(name, names, f"[{name}]")
+            columns = fitting_some(name, names, name)
             if "gain" in table:
                 made.gain[columns] = _number(name, table, "gain", -LARGEST, LARGEST)
             if "limits" in table:
