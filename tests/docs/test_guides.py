@@ -29,7 +29,7 @@ ON_THEIR_OWN = {
     "phone-to-blender.md": "phone-demo/shot.h5",
     "optical-markers.md": "optical-demo/result.h5",
 }
-GOING_ON = ["posing.md", "key-frames.md", "live.md", "batch.md"]
+GOING_ON = ["posing.md", "key-frames.md", "live.md", "batch.md", "blender.md", "unreal.md"]
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#([\w-]+))?\)")
 
 
