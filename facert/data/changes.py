@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
-from facert.data.labelling import Poses, labelled
+from facert.data.labelling import Poses, labelled, of_character
+from facert.data.limits import StatedLimits, with_limits
 from facert.data.names import NameIndex, nearest
 from facert.data.rate import BROKEN, standard_rate, whole_count
 from facert.data.resampling import resampled
@@ -30,6 +31,10 @@ class Changes:
     """From names in the file to new ones, see `renamed`."""
     poses: Poses | None = None
     """Labels to add, by the frames and times of the file."""
+    controls: Controls | None = None
+    """The character's, whose names, order and limits the poses are to have."""
+    limits: tuple[StatedLimits, ...] = ()
+    """Limits of controls that somebody states."""
     fps: float | None = None
     """Frames a second to resample to."""
     in_units: str = ""
@@ -46,6 +51,7 @@ class Changes:
         """The requested options that apply to takes only."""
         asked = {
             "--poses": self.poses,
+            "--limits": self.limits,
             "--fps": self.fps,
             "--start-timecode": self.start_timecode,
         }
@@ -83,13 +89,23 @@ def in_space(found: Take | Rig, changes: Changes) -> Take | Rig:
 
 
 def _in_time(take: Take, changes: Changes) -> Take:
-    if changes.poses is not None:
-        take = labelled(take, changes.poses)
+    take = _posed(take, changes)
     if changes.fps is not None:
         take = resampled(take, standard_rate(changes.fps))
     if not changes.start_timecode:
         return take
     return replace(take, start_timecode=_start_timecode(changes.start_timecode, take.fps))
+
+
+def _posed(take: Take, changes: Changes) -> Take:
+    """The take with the poses, the names and the limits that are asked for."""
+    poses, controls = changes.poses, changes.controls
+    if controls is not None:
+        take = of_character(take, controls)
+        poses = None if poses is None else poses.of_character(controls)
+    if poses is not None:
+        take = labelled(take, poses)
+    return with_limits(take, changes.limits) if poses or controls or changes.limits else take
 
 
 def _start_timecode(start: str, fps: float) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -115,10 +117,15 @@ def _of_target(take: Take) -> dict[str, Any] | None:
         "first_labels": tuple(take.labels[:MANY].tolist()),
         "active": int(active.sum()),
         "constant": _pick(names, ~active),
-        "limits": None if limits is None else tuple(map(tuple, limits.tolist())),
+        "limits": None if limits is None else tuple(map(_ends, limits.tolist())),
         "deviations": take.std is not None,
         "animation": 0 if take.animation is None else len(take.animation),
     }
+
+
+def _ends(limits: Sequence[float]) -> tuple[float | None, ...]:
+    """The low and the high limit of a control, None where there is none."""
+    return tuple(end if math.isfinite(end) else None for end in limits)
 
 
 def _of_rig(rig: Rig) -> dict[str, Any]:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray, checked_names
-from facert.data.names import NameIndex, match
+from facert.data.names import NameIndex, instead_of, match
 from facert.data.resampling import nearest_frames
 from facert.data.rig import Shaped
 from facert.data.take import Controls, Take, named_curves
-from facert.data.text import plural
+from facert.data.text import listed, plural
 from facert.errors import InputError, reading
 
 log = logging.getLogger("facert")
@@ -35,6 +36,26 @@ class Poses:
     limits: FloatArray | None = None  # (P, 2)
     where: str = "poses"
     """The file or argument that they are from, for messages."""
+
+    def of_character(self, controls: Controls) -> Poses:
+        """The poses in the order, the spelling and the limits of a character's controls.
+
+        A control of which the character has a left and a right half moves both; those that the
+        poses lack are 0 in them, and the log counts them.
+
+        Raises `InputError` for a control that the character has not, with the nearest one, and for
+        two that it has as one.
+        """
+        with reading(self.where):
+            places = _places(self.names, controls, "names of the poses")
+        values = _spread(self.values, places, len(controls.names))
+        lacking = len(controls.names) - sum(map(len, places))
+        if lacking:
+            log.info(
+                "%s: %s of the character %s not in it, and taken as 0",
+                *(self.where, plural(lacking, "control"), "is" if lacking == 1 else "are"),
+            )
+        return replace(self, names=controls.names, values=values, limits=controls.limits)
 
 
 def labelled(take: Take, poses: Poses) -> Take:
@@ -65,6 +86,53 @@ def placed(take: Take, poses: Poses) -> tuple[IntArray, Controls, FloatArray]:
         _require_different(frames)
         controls, order = _common_controls(take, poses)
         return frames, controls, poses.values[:, order]
+
+
+def of_character(take: Take, controls: Controls) -> Take:
+    """A take whose poses are those of a character's controls, see `Poses.of_character`."""
+    if take.controls is None or take.controls.names == controls.names:
+        return take if take.controls is None else replace(take, controls=controls)
+    places = _places(take.controls.names, controls, "/target/names")
+    params, std, animation = (
+        None if values is None else _spread(values, places, len(controls.names))
+        for values in (take.params, take.std, take.animation)
+    )
+    return replace(take, controls=controls, params=params, std=std, animation=animation)
+
+
+def _places(names: Sequence[str], controls: Controls, field: str) -> list[list[int]]:
+    """The control of a character, or the two halves, that each name stands for."""
+    index = NameIndex.among(controls.names, names, field, halves=True)
+    places = [index.find_halves(name) for name in names]
+    unknown = [name for name, found in zip(names, places, strict=True) if not found]
+    if unknown:
+        meant = instead_of(unknown[0], controls.names)
+        fix = f"Did you mean {meant}? " if meant else ""
+        others = f", nor {listed(unknown[1:])}" if unknown[1:] else ""
+        raise InputError(
+            field,
+            f"controls of the character ({len(controls.names)})",
+            f"{unknown[0]!r}, which it has not{others}",
+            f"{fix}Correct the name, or leave out --rig: then any names count.",
+        )
+    taken: dict[int, str] = {}
+    for name, found in zip(names, places, strict=True):
+        for place in found:
+            other = taken.setdefault(place, name)
+            if other != name:
+                both = f"{other!r} and {name!r} for {controls.names[place]!r}"
+                raise InputError(field, "one name a control", both, "Leave one of them out.")
+    return places
+
+
+def _spread(values: FloatArray, places: Sequence[Sequence[int]], count: int) -> FloatArray:
+    """Values (n, p) of controls at their places among others, (n, count), which are 0."""
+    spread = np.zeros((len(values), count))
+    for column, found in enumerate(places):
+        spread[:, list(found)] = values[:, [column]]
+    unposed = np.isnan(values).all(axis=1)
+    spread[unposed] = np.nan
+    return spread
 
 
 def _known(poses: Poses) -> Poses:
@@ -157,11 +225,16 @@ def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:
     """Controls of take and poses, and the column of each in the poses."""
     if take.controls is None or (not len(take.labels) and take.animation is None):
         return Controls(poses.names, poses.limits), np.arange(len(poses.names))
-    order = match(take.controls.names, poses.names, "names of the poses")
+    controls = take.controls
+    order = match(controls.names, poses.names, "names of the poses")
     if len(order) != len(poses.names):
-        expected, found = f"the take's {len(take.controls.names)} controls", f"{len(poses.names)}"
-        raise InputError("names of the poses", expected, found, "Pose the same controls.")
-    return take.controls, order
+        others = [name for i, name in enumerate(poses.names) if i not in set(order.tolist())]
+        expected, found = f"the take's {len(controls.names)} controls", f"also {listed(others)}"
+        fix = "Pose the same controls, or give the character's to all poses with --rig."
+        raise InputError("names of the poses", expected, found, fix)
+    if controls.limits is None and poses.limits is not None:
+        controls = replace(controls, limits=poses.limits[order])
+    return controls, order
 
 
 def poses_of(take: Take) -> Poses:

@@ -37,11 +37,14 @@ _FRAME = "frame"
 _FRAMES = 5.0  # rows a second of a table, which are frames and not poses now and then
 
 
-def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -> Poses:
+def read_poses(
+    path: Path, fps: float | None = None, keep: Sequence[str] = (), target: str | None = None
+) -> Poses:
     """Read poses: of a table or JSON with a column ``frame``, its rows; else of a take, by time.
 
     `fps` is the rate of the recording, whatever the file states. Columns of a table that are no
     controls, such as a confidence, are left out, and the log names them; those in `keep` stay.
+    `target` chooses among several of an .npz track, or animations of a glTF file.
 
     Raises `InputError` when the file cannot be read, a row names no frame, there are no poses in
     it, or a model predicted them all.
@@ -52,7 +55,7 @@ def read_poses(path: Path, fps: float | None = None, keep: Sequence[str] = ()) -
         if table is not None:
             poses = _of_numbers(table, keep, fps)
         else:
-            take = read_any(path, kind="take", or_fps=fps, keep=keep, sparse=True)
+            take = read_any(path, target, kind="take", or_fps=fps, keep=keep, sparse=True)
             take = _at_rate(take, path, fps)
             poses = poses_of(_set_by_somebody(take, path))
             if take.clock_start and _has_column_of_times(path):

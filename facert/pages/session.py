@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray, rms
+from facert.data.limits import bounds_of, rig_controls
 from facert.data.names import match
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
@@ -84,9 +85,7 @@ class PosingSession:
         poses = keep(labels, animation, seed=0)
         if len(poses) < LEAST:
             return None
-        limits = self.controls.limits
-        spans = np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
-        return KnownPoses(poses, spans if limits is None else limits)
+        return KnownPoses(poses, bounds_of(self.controls.limits, poses))
 
     def pose(self, frame: int) -> tuple[FloatArray | None, FloatArray | None]:
         """The label of a frame, else the prediction with its standard deviation, else None."""
@@ -199,7 +198,7 @@ def character_controls(model: Retargeter | None, take: Take | None, rig: Rig | N
     if take is not None and take.controls is not None:
         return take.controls
     if rig is not None:
-        return Controls(rig.names, np.tile([0.0, 1.0], (len(rig.names), 1)))
+        return rig_controls(rig)
     expected, fix = "a model, a take with controls, or a rig", "Give --model or --rig."
     raise InputError("the character", expected, "none", fix)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.limits import bounds_of
 from facert.data.names import NameIndex, fitting_some, instead_of, match
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
@@ -170,9 +171,7 @@ def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
         fix = "Train the model again, or give a take with poses."
         raise InputError("poses of the character", f"at least {LEAST}", found, fix)
     if bounds is None:
-        bounds = controls.limits
-    if bounds is None:
-        bounds = np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
+        bounds = bounds_of(controls.limits, poses)
     return controls, KnownPoses(keep(poses, None, seed=0), bounds)
 
 

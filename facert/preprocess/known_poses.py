@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.limits import bounds_of
 from facert.data.take import Take
 from facert.settings import LimitRule
 
@@ -45,17 +46,19 @@ def keep(labelled: FloatArray, animation: FloatArray | None, seed: int) -> Float
 
 
 def pose_bounds(take: Take, posed: FloatArray, rule: LimitRule) -> FloatArray | None:
-    """Bounds that poses are clipped to, (P, 2): the take's limits, or the range of known poses.
+    """Bounds that poses are clipped to, (P, 2): the take's limits, else the range of known poses.
 
-    These are given poses (l, P), as of the labelled frames, and all of the animation.
+    These are given poses (l, P), as of the labelled frames, and all of the animation. A control
+    without a limit has the range of its poses, as long as the rule is no other.
     """
     declared = None if take.controls is None else take.controls.limits
     if rule == "none":
         return None
-    if rule == "declared" or declared is not None:
+    if rule == "declared":
         return declared
-    poses = posed if take.animation is None else np.vstack([posed, take.animation])
-    return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)
+    return bounds_of(
+        declared, posed if take.animation is None else np.vstack([posed, take.animation])
+    )
 
 
 def _some(poses: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:

@@ -23,6 +23,7 @@ from facert.retarget.model import TrainedModel
 from facert.settings import Settings
 
 FORMAT = "facert-model"
+NO_LIMIT = float(np.finfo(np.float64).max)
 Model = TypeVar("Model", bound=TrainedModel)
 
 
@@ -36,8 +37,8 @@ def write_model(model: TrainedModel, path: Path, overwrite: bool) -> None:
     """
     known = np.isfinite(model.neutral).all()  # an earlier release did not know the actor at rest
     optional = {
-        "target.limits": model.controls.limits,
-        "target.bounds": model.bounds,
+        "target.limits": _stored(model.controls.limits),
+        "target.bounds": _stored(model.bounds),
         "target.poses": model.poses,
         "source.neutral": model.neutral if known else None,
         "source.labelled": model.labelled,
@@ -61,6 +62,18 @@ def write_model(model: TrainedModel, path: Path, overwrite: bool) -> None:
     write_tensors(path, arrays, metadata, overwrite)
 
 
+def _stored(limits: FloatArray | None) -> FloatArray | None:
+    """Limits as a file holds them: its numbers are finite."""
+    return None if limits is None else np.clip(limits, -NO_LIMIT, NO_LIMIT)
+
+
+def _limits_of(stored: FloatArray | None) -> FloatArray | None:
+    """The limits that a file holds, infinite where there is none."""
+    if stored is None:
+        return None
+    return np.where(np.abs(stored) < NO_LIMIT, stored, np.copysign(np.inf, stored))
+
+
 def read_model(path: Path, make: type[Model]) -> Model:
     """Read a model from its file, as a `TrainedModel` or a class that adds to it.
 
@@ -77,8 +90,11 @@ def read_model(path: Path, make: type[Model]) -> Model:
         try:
             settings = Settings().with_changes(metadata["settings"])
             kind, names = metadata["source_kind"], tuple(map(str, metadata["source_names"]))
-            controls = Controls(tuple(metadata["target_names"]), arrays.get("target.limits"))
-            bounds = Controls(controls.names, arrays.get("target.bounds")).limits
+            limits, bounds = (
+                _limits_of(arrays.get(f"target.{name}")) for name in ("limits", "bounds")
+            )
+            controls = Controls(tuple(metadata["target_names"]), limits)
+            bounds = Controls(controls.names, bounds).limits
             figures = dict(metadata.get("figures", {}))
             # Earlier releases counted the labels in the figures alone.
             labels = _count(metadata.get("labels") or figures.get("labelled frames", 0))

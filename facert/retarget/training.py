@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from facert.data.arrays import FloatArray
 from facert.data.columns import warn_of_clocks
 from facert.data.labelling import predicted_poses, without_predicted
 from facert.data.matching_takes import as_takes
@@ -18,11 +15,9 @@ from facert.data.subject import about
 from facert.data.take import Take
 from facert.data.takes import Takes
 from facert.data.text import plural
-from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
 from facert.models.optim.monitor import Monitor
-from facert.preprocess.faults.absurd import NATURAL
-from facert.preprocess.faults.quantiles import quantile
+from facert.preprocess.label_checks import warn_of_labels
 from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.motion.pooled import PooledEstimate
 from facert.preprocess.preparation import TrainingData, training_data
@@ -31,11 +26,6 @@ from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
 log = logging.getLogger("facert")
-
-ABSURD, LARGE, OFTEN, NAMED = 3.0, 0.75, 3, 5
-"""A value of a label is absurd that is so many times as far as its control goes, by its limits, by
-this quantile of all values, and by the controls that have so many values; so many are named."""
-SHARE, PERCENT = NATURAL
 
 
 def train(
@@ -75,7 +65,7 @@ def train(
     if settings.unlabelled is None:
         settings = replace(settings, unlabelled=method_class(settings.method).most_unlabelled)
     require_known(settings)
-    _warn_of_absurd_poses(takes)
+    warn_of_labels(takes.joined, takes.frame_name)
     for part, name in takes.named:
         with about(name):
             warn_of_clocks(part)
@@ -149,56 +139,6 @@ def check_poses(take: Take) -> None:
             "%s with a standard deviation: predicted, and not learned from, but the other %d are",
             *(plural(predicted, "pose"), len(take.labels) - predicted),
         )
-
-
-def _all_predicted(count: int) -> InputError:
-    return InputError(
-        "/target/std",
-        "poses that somebody set",
-        f"a standard deviation for all {count}: a model predicted them",
-        "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
-        "learns from these nonetheless.",
-    )
-
-
-def _warn_of_absurd_poses(takes: Takes) -> None:
-    """Warn of values among the labels that are far beyond all that is like them."""
-    take = takes.joined
-    if take.params is None or take.controls is None or not len(take.labels):
-        return
-    sizes = np.abs(take.params[take.labels])
-    reach = ABSURD * _reach(sizes, take.controls.limits)
-    if take.animation is not None and len(take.animation):
-        reach = np.maximum(reach, np.abs(take.animation).max(axis=0))
-    for row, control in np.argwhere(sizes > reach)[:NAMED].tolist():
-        log.warning(
-            "the pose of frame %s has %s at %.3g, many times as much as other poses and controls:"
-            " correct it if it is a slip",
-            takes.frame_name(int(take.labels[row])),
-            take.controls.names[control],
-            take.params[take.labels[row], control],
-        )
-
-
-def _reach(sizes: FloatArray, limits: FloatArray | None) -> FloatArray:
-    """How far controls go, by the sizes of their values in poses (l, P), or by their limits, (P,).
-
-    Shares go to 1; percent and degrees, of which half of a control's values are beyond 1, to about
-    100; and all as far as half of the values of another control that is often used.
-    """
-    used = np.where(sizes > 0.0, sizes, np.nan)
-    counts = (sizes > 0.0).sum(axis=0)
-    ordered = np.nan_to_num(np.sort(used, axis=0))  # NaN comes last
-    middle = ordered[np.maximum(counts - 1, 0) // 2, np.arange(sizes.shape[1])]
-    own = np.where(counts > 1, middle, 0.0)  # one alone is like none
-    large = float(quantile(used.ravel(), LARGE)) if counts.any() else 0.0
-    others = own[counts >= OFTEN].max(initial=0.0)
-    own = np.maximum(own, large)
-    reach = np.maximum(np.where(own > SHARE, np.maximum(own, PERCENT), SHARE), others)
-    if limits is None:
-        return np.asarray(reach)
-    widest = np.abs(limits).max(axis=1)
-    return np.asarray(np.where(np.isfinite(widest) & (widest > 0.0), widest, reach))
 
 
 def _start(start: Retargeter, data: TrainingData) -> StartingModel:

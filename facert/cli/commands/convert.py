@@ -14,7 +14,6 @@ from facert.cli.shared.options import (
     JOBS,
     OUT_DIR,
     OVERWRITE,
-    RIG,
     SHAPES,
     argument,
     file_option,
@@ -39,7 +38,8 @@ def command(
         option("What to read of a .glb that holds both; else the rig."),
     ] = None,
     target: Annotated[
-        str | None, file_option("Which target of an .npz track, or animation of a .glb.")
+        str | None,
+        file_option("Which target of an .npz track, or animation of a .glb, IN or --poses."),
     ] = None,
     shapes: SHAPES = None,
     map_path: Annotated[
@@ -51,6 +51,14 @@ def command(
     poses_path: Annotated[
         Path | None,
         file_option("Labels from another file, by its column frame or by time.", "--poses"),
+    ] = None,
+    limits: Annotated[
+        list[str] | None,
+        file_option(
+            "Limits of the controls: LO..HI, NAME=LO..HI (also 'mouth*=0..1') or none; repeatable."
+            " By default those of --rig, else 0..1 where all poses keep to it.",
+            metavar="LIMITS",
+        ),
     ] = None,
     in_fps: Annotated[
         float | None,
@@ -77,7 +85,10 @@ def command(
         bool,
         option("Move, turn and scale .obj that are not in register with neutral.obj."),
     ] = False,
-    rig_path: RIG = None,
+    rig_path: Annotated[
+        Path | None,
+        file_option("The character's rig: names and limits of poses; the mesh.", "--rig"),
+    ] = None,
     drivers_path: DRIVERS = None,
     out_dir: OUT_DIR = None,
     ending: ENDING = None,
@@ -93,21 +104,27 @@ def command(
     rig that a take moves, or the few morph targets that move a mesh as its sequence does; a .glb of
     a character in a .glb, .gltf or .vrm is that file as it is, with the animation added. What IN
     does not state of its rate, unit or axis is taken to be as OUT's.
+    With --rig, poses have the names, the order and the limits of its controls: a name that it lacks
+    is refused, a control that the poses lack is 0.
 
     facert convert retargeted.h5 curves.csv
     facert convert retargeted.h5 face.glb --rig facert-demo/character.h5
     """
     from facert.cli.shared.conversion import KINDS, Wanted, convert_file
     from facert.data.changes import Changes
+    from facert.data.limits import parse_limits
+    from facert.io.formats import targets_for
     from facert.io.poses import read_poses
     from facert.io.toml import read_drivers, read_toml
 
     others = (map_path, poses_path, rig_path, drivers_path)
     require_inputs(*others)
     todo = plan(paths, out_dir, ending, jobs, overwrite, KINDS, others)
+    of_poses, of_take = targets_for(target, poses_path, paths[0])
     changes = Changes(
         names=read_toml(map_path) if map_path else {},
-        poses=read_poses(poses_path, in_fps, keep or ()) if poses_path else None,
+        poses=read_poses(poses_path, in_fps, keep or (), of_poses) if poses_path else None,
+        limits=parse_limits(limits or ()),
         fps=fps,
         in_units=in_units,
         units=units,
@@ -117,7 +134,7 @@ def command(
     )
     drivers = read_drivers(drivers_path) if drivers_path else None
     wanted = Wanted(
-        *(kind, target, shapes, in_fps, fps, rig_path, drivers), tuple(keep or ()), align_shapes
+        *(kind, of_take, shapes, in_fps, fps, rig_path, drivers), tuple(keep or ()), align_shapes
     )
     work = partial(convert_file, wanted=wanted, changes=changes, overwrite=overwrite)
     carry_out(todo, work, overwrite)

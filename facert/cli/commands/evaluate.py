@@ -121,6 +121,7 @@ def command(
     from facert.evaluation.table import summarise
     from facert.io.formats import read_rig_file, targets_for
     from facert.models.device import find_device
+    from facert.preprocess.label_checks import warn_of_labels
     from facert.settings import Settings
 
     numbers = _numbers(labels, "--labels"), _numbers(unlabelled, "--unlabelled")
@@ -137,6 +138,7 @@ def command(
             None if across is None else _read(across, of_across),
             None if rig is None else read_rig_file(rig, shapes),
         )
+        warn_of_labels(problem.take)
         grid = chosen_grid(problem, chosen, *numbers, repeats)
         journal = None if json_path is None else journal_beside(json_path, problem, settings)
         outcomes = _run(problem, grid, settings, jobs, journal)

@@ -108,6 +108,8 @@ def _lines(facts: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
 
 
 def _text(value: Any) -> str:
+    if value is None:
+        return "any"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

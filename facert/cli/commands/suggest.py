@@ -103,7 +103,7 @@ def command(
     model = _model(have) if have not in ("", LABELS) else None
     given = _read(paths, target, have, model)
     with reading(listed_files(paths)):
-        posed = _posed(given) if have == LABELS else ()
+        posed = _posed(given, short_names(paths)) if have == LABELS else ()
         recorded = given if model else list(map(without_poses, given))
         takes = as_takes(recorded, (), short_names(paths))
         actor = read_actor(takes.joined, actor_path, shapes) if sheet else None
@@ -140,11 +140,14 @@ def _read(
     return [read_source_file(path, key, names) for path, key in keys]
 
 
-def _posed(takes: Sequence[Take]) -> list[IntArray] | IntArray:
+def _posed(takes: Sequence[Take], names: Sequence[str]) -> list[IntArray] | IntArray:
     """Posed frames of each take that the suggestion continues."""
     from facert.data.labelling import without_predicted
+    from facert.data.subject import about
+    from facert.preprocess.label_checks import warn_of_labels
 
-    labels = [without_predicted(take).labels for take in takes]
+    posed = list(map(without_predicted, takes))
+    labels = [take.labels for take in posed]
     count = sum(map(len, labels))
     if not count:
         from facert.errors import InputError
@@ -152,6 +155,9 @@ def _posed(takes: Sequence[Take]) -> list[IntArray] | IntArray:
         raise InputError(
             "/target/params", "posed frames, for --have labels", "none", "Leave --have out."
         )
+    for take, name in zip(posed, names if len(posed) > 1 else ("",), strict=True):
+        with about(name):
+            warn_of_labels(take)
     console.log.info("goes on from %s", plural(count, "posed frame"))
     return labels if len(labels) > 1 else labels[0]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,16 @@ from facert.cli.shared.files import warn_of_unit
 from facert.data.changes import Changes, converted, in_space
 from facert.data.drivers import Drivers
 from facert.data.labelling import weights_as_poses
+from facert.data.limits import rig_controls
 from facert.data.rig import Rig, Shaped
-from facert.data.take import Take
+from facert.data.take import Controls, Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.io import formats
 from facert.io.gltf.carried import CarriedFile
 from facert.io.gltf.character import Character
 from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
+from facert.io.npz import NO_TARGET
 from facert.io.registry import (
     GLTF_ENDINGS,
     OWN_ENDINGS,
@@ -30,6 +33,7 @@ from facert.io.registry import (
     write,
 )
 from facert.mesh.morphs import Morphs, compact_morphs, moving_morphs, rig_morphs
+from facert.preprocess.label_checks import warn_of_labels
 from facert.render.faces import control_settings, require_poses
 
 KINDS: tuple[Kind, ...] = ("take", "rig", "morphs")
@@ -75,14 +79,26 @@ def _convert(source: Path, output: Path, wanted: Wanted, changes: Changes, overw
             CarriedFile(source).write(output, overwrite)
         return f"the character as in {source.name}"
     found = _read(source, output, wanted, changes)
+    if wanted.rig is not None and not of_morphs:
+        changes = replace(changes, controls=_controls(wanted.rig, wanted.shapes, wanted.drivers))
     with reading(source):
         found = converted(found, changes)
+        if isinstance(found, Take) and (changes.poses or changes.controls or changes.limits):
+            warn_of_labels(found)
         if isinstance(found, Rig):
             return _write_rig(found, output, overwrite)
         if of_morphs:
             return _write_moved(found, output, wanted, changes, overwrite)
     count = formats.write_take_file(found, output, overwrite)
     return _content(found, count, output)
+
+
+@lru_cache(1)
+def _controls(rig: Path, shapes: str | None, drivers: Drivers | None) -> Controls:
+    """The controls of a character: its shapes, and what else it has drivers for."""
+    with reading(rig):
+        found = formats.read_rig_file(rig, shapes)
+    return rig_controls(found, () if drivers is None else drivers.controls)
 
 
 def _content(take: Take, count: int, output: Path) -> str:
@@ -103,7 +119,11 @@ def _read(source: Path, output: Path, wanted: Wanted, changes: Changes) -> Take 
     no_rig = not output_format(output, *KINDS).write.keys() & {"rig", "morphs"}
     if kind is None and (wanted.rig or wanted.fps or changes.of_frames or no_rig):
         kind = "take"
-    options = (wanted.target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
+    target = wanted.target
+    if target is None and changes.poses is not None and formats.targets_of(source):
+        console.log.info("%s: of its targets none is read: --target chooses", source.name)
+        target = NO_TARGET
+    options = (target, wanted.shapes, wanted.fps, kind, wanted.or_fps)
     return formats.read_any(source, *options, wanted.keep, wanted.align)
 
 
