@@ -15,6 +15,7 @@ from facert.data.subject import about
 from facert.data.take import Take
 from facert.data.takes import Takes
 from facert.data.text import plural
+from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.label_checks import warn_of_labels
@@ -139,6 +140,16 @@ def check_poses(take: Take) -> None:
             "%s with a standard deviation: predicted, and not learned from, but the other %d are",
             *(plural(predicted, "pose"), len(take.labels) - predicted),
         )
+
+
+def _all_predicted(count: int) -> InputError:
+    return InputError(
+        "/target/std",
+        "poses that somebody set",
+        f"a standard deviation for all {count}: a model predicted them",
+        "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
+        "learns from these nonetheless.",
+    )
 
 
 def _start(start: Retargeter, data: TrainingData) -> StartingModel:
