@@ -19,6 +19,16 @@ OPTIONS = ("--methods", "ridge", "--labels", "4,6", "--unlabelled", 10, "--repea
 QUICK = (*OPTIONS, "--test-frames", 30, "--jobs", 1)
 
 
+@pytest.mark.parametrize("name", ["kept.json", "kept.h5"])
+def test_a_take_of_ours_is_not_replaced_by_figures(facert, take, tmp_path, name):
+    kept = tmp_path / name
+    assert facert("convert", take, kept).code == 0
+    before = kept.read_bytes()
+    outcome = facert("eval", take, *QUICK, "--json", kept, "--overwrite")
+    assert (outcome.code, kept.read_bytes() == before) == (3, True)
+    assert "holds something else than a report: it is never replaced" in outcome.err
+
+
 @pytest.mark.parametrize(
     ("text", "numbers"),
     [

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pygltflib as gltf
 
+FACE = np.float32([[-0.1, 0, 0], [0.1, 0, 0], [0, 0.2, 0]])
+EYE = np.float32([[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0]])
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
@@ -102,3 +104,37 @@ def glb(root: dict[str, Any], content: bytes) -> bytes:
         + struct.pack("<II", len(text), 0x4E4F534A) + text
         + struct.pack("<II", len(content), 0x004E4942) + content
     )  # fmt: skip
+
+
+def character(unused: int = 0) -> Builder:
+    """A face that hangs by half on a jaw; an eye below a head; teeth, a body, a cornea, a stage."""
+    builder = Builder()
+    jaw = builder.joint(name="jaw", translation=[0, 0.05, 0])
+    head = builder.joint(name="head", scale=[0.01] * 3, children=[jaw])
+    builder.document.nodes[jaw].translation = [0, 5, 0]
+    skin = builder.skin([head, jaw], np.stack([np.diag([100, 100, 100, 1.0]), _bound()]))
+    joints, weights = (
+        np.uint8([[0, 1, unused, unused]] * 3),
+        np.float32([[0.5, 0.5, 0, 0], [1, 0, 0, 0]] * 2),
+    )
+    tied = {"JOINTS_0": builder.accessor(joints), "WEIGHTS_0": builder.accessor(weights[:3])}
+    builder.mesh(FACE, {"jawOpen": np.float32([[0, -0.02, 0]] * 3)}, tied, skin=skin, name="face")
+    both = np.float32([[0, 1, 0, 0]] * 3)
+    tied = {"JOINTS_0": builder.accessor(joints), "WEIGHTS_0": builder.accessor(both)}
+    builder.mesh(FACE * 0.5, {}, tied, skin=skin, name="teeth")
+    builder.mesh(EYE, {}, name="eye", translation=[0.05, 0.1, 0.01])
+    builder.mesh(EYE, {}, name="cornea", translation=[0.05, 0.1, 0.02])
+    builder.mesh(FACE * 100, {}, name="stage", translation=[0, -9, 0])
+    builder.document.materials = [
+        gltf.Material(pbrMetallicRoughness=gltf.PbrMetallicRoughness(baseColorFactor=[1, 0, 0, 1])),
+        gltf.Material(alphaMode="BLEND"),
+    ]
+    for mesh, material in ((2, 0), (3, 1)):
+        builder.document.meshes[mesh].primitives[0].material = material
+    return builder
+
+
+def _bound() -> np.ndarray:
+    matrix = np.diag([100, 100, 100, 1.0])
+    matrix[1, 3] = -5
+    return matrix

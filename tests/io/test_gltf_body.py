@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pygltflib as gltf
 import pytest
-from gltf_files import Builder
+from gltf_files import EYE, FACE, Builder, character
 from scipy.spatial.transform import Rotation
 
 from facert import Controls, Source, Take
@@ -17,8 +16,6 @@ from facert.data.units import with_units
 from facert.io.gltf.rig import read_gltf_rig
 from facert.render.faces import frame_faces, posed_face
 
-FACE = np.float32([[-0.1, 0, 0], [0.1, 0, 0], [0, 0.2, 0]])
-EYE = np.float32([[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0]])
 AT, DOWN = np.array([0.05, 0.1, 0.01]), np.array([0, -0.02, 0])
 DRIVERS = Drivers.of(
     {
@@ -30,34 +27,7 @@ DRIVERS = Drivers.of(
 
 @pytest.fixture(name="builder")
 def _builder() -> Builder:
-    """A face that hangs by half on a jaw; an eye below a head; teeth, a body, a cornea, a stage."""
-    builder = Builder()
-    jaw = builder.joint(name="jaw", translation=[0, 0.05, 0])
-    head = builder.joint(name="head", scale=[0.01] * 3, children=[jaw])
-    builder.document.nodes[jaw].translation = [0, 5, 0]
-    skin = builder.skin([head, jaw], np.stack([np.diag([100, 100, 100, 1.0]), _bound()]))
-    joints, weights = np.uint8([[0, 1, 9, 9]] * 3), np.float32([[0.5, 0.5, 0, 0], [1, 0, 0, 0]] * 2)
-    tied = {"JOINTS_0": builder.accessor(joints), "WEIGHTS_0": builder.accessor(weights[:3])}
-    builder.mesh(FACE, {"jawOpen": np.float32([[0, -0.02, 0]] * 3)}, tied, skin=skin, name="face")
-    both = np.float32([[0, 1, 0, 0]] * 3)
-    tied = {"JOINTS_0": builder.accessor(joints), "WEIGHTS_0": builder.accessor(both)}
-    builder.mesh(FACE * 0.5, {}, tied, skin=skin, name="teeth")
-    builder.mesh(EYE, {}, name="eye", translation=[0.05, 0.1, 0.01])
-    builder.mesh(EYE, {}, name="cornea", translation=[0.05, 0.1, 0.02])
-    builder.mesh(FACE * 100, {}, name="stage", translation=[0, -9, 0])
-    builder.document.materials = [
-        gltf.Material(pbrMetallicRoughness=gltf.PbrMetallicRoughness(baseColorFactor=[1, 0, 0, 1])),
-        gltf.Material(alphaMode="BLEND"),
-    ]
-    for mesh, material in ((2, 0), (3, 1)):
-        builder.document.meshes[mesh].primitives[0].material = material
-    return builder
-
-
-def _bound() -> np.ndarray:
-    matrix = np.diag([100, 100, 100, 1.0])
-    matrix[1, 3] = -5
-    return matrix
+    return character(unused=9)
 
 
 def posed(rig: Rig, **values: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import require_name, save_json, save_picture
+from facert.cli.shared.files import require_name, require_report, save_json, save_picture
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     DEVICE,
@@ -26,7 +26,6 @@ from facert.cli.shared.options import (
 from facert.data.ranges import parse_range
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.registry import require_replaceable
 from facert.methods.registry import REGISTRY
 
 if TYPE_CHECKING:
@@ -107,7 +106,7 @@ def command(
     """
     require_inputs(take, across, rig)
     if json_path is not None:
-        require_replaceable(json_path, overwrite)
+        require_report(json_path, overwrite)
     if plot is not None:
         require_name(plot, overwrite)
     if across is not None and split != "random":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from facert.cli.shared import console
 from facert.cli.shared.batch import Plan, carry_out, plan
-from facert.cli.shared.files import write_beside
+from facert.cli.shared.files import require_report, write_beside
 from facert.cli.shared.options import (
     CONTROLS,
     DEFAULT_MODEL,
@@ -31,7 +31,7 @@ from facert.cli.shared.options import (
 from facert.cli.shared.verdicts import print_verdicts, save_verdicts
 from facert.data.text import plural
 from facert.errors import InputError, reading
-from facert.io.registry import OWN_ENDINGS, require_replaceable
+from facert.io.registry import OWN_ENDINGS
 
 Mode = Literal["offline", "online"]
 
@@ -89,7 +89,7 @@ def command(
     facert retarget facert-demo/training.h5 --out-dir results --ending .csv
     """
     if json_path is not None:
-        require_replaceable(json_path, overwrite)
+        require_report(json_path, overwrite)
     todo = plan(paths, out_dir, ending, jobs, overwrite)
     options = MappingOptions(controls, no_detect, no_smooth, sigma, neutral)
     work = partial(

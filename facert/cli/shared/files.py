@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from facert.cli.shared import console
-from facert.errors import InputError, reading
+from facert.errors import InputError, OutputKeptError, reading
 from facert.io.atomic import replacing
 from facert.io.registry import require_replaceable
 
@@ -39,6 +39,26 @@ def require_name(path: Path, overwrite: bool, endings: tuple[str, ...] = PICTURE
         found = repr(path.suffix) if path.suffix else "none"
         raise InputError("output", expected, found, "Give another name.", where=str(path))
     require_replaceable(path, overwrite)
+
+
+def require_report(path: Path, overwrite: bool) -> None:
+    """Refuse a name of JSON that could not be written to, or would replace anything but a report.
+
+    Raises
+    ------
+    OutputExistsError
+        When the file exists and `overwrite` is not set, or it holds a take or something else.
+    """
+    from facert.io.curves import holds_curves, read_json_object
+
+    require_replaceable(path, overwrite)
+    if path.exists():
+        try:
+            holds_report = not holds_curves(read_json_object(path))
+        except InputError:
+            holds_report = False
+        if not holds_report:
+            raise OutputKeptError(path, "the file holds something else than a report")
 
 
 def require_other_file(source: Path, output: Path, name: str) -> None:
