@@ -91,7 +91,8 @@ class Takes:
         """
         first = self.parts[0]
         if len(self.parts) == 1:
-            return replace(first, animation=self.animation)
+            same = self.animation is first.animation
+            return first if same else replace(first, animation=self.animation)
         return Take(
             time=_one_after_the_other([part.time for part in self.parts]),
             source=first.source.followed_by([part.source for part in self.parts[1:]]),

@@ -115,7 +115,7 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
         return Outcome(cell, failure="poses that are not finite")
     return Outcome(
         cell,
-        score(errors, chosen.test, problem.ranges, problem.gram),
+        score(errors, problem.in_time(chosen.test), problem.ranges, problem.gram),
         fit_seconds=trained - began,
         frame_ms=1e3 * (ended - trained) / len(frames),
     )

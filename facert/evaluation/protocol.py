@@ -7,17 +7,21 @@ methods meet the same data. The draws of one repeat are nested: 20 labels are 10
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.labelling import predicted_poses
+from facert.data.matching_takes import as_takes
 from facert.data.names import match
 from facert.data.normalisation import Normalisation
 from facert.data.rig import Rig
+from facert.data.subject import about
 from facert.data.take import Controls, Take
+from facert.data.takes import Takes
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.metrics import vertex_gram
@@ -67,11 +71,25 @@ class Problem:
     test: Take
     protocol: Protocol
     gram: FloatArray | None = None  # (P, P): The rig's, for errors of vertices
+    # (n - 1,): Where another take begins among the frames of several that `take` consists of
+    borders: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def across(self) -> bool:
         """Whether the test frames are from another take."""
         return self.test is not self.take
+
+    def in_time(self, frames: IntArray) -> IntArray:
+        """Numbers of test frames (n,), of which those that follow each other are of one take."""
+        if self.across:
+            return frames
+        return frames + np.searchsorted(self.borders, frames, side="right")
+
+    def blocks(self, frames: IntArray) -> IntArray:
+        """The tenth of its take in which each frame (n,) lies, from 0."""
+        ends = np.concatenate([[0], self.borders, [len(self.take)]])
+        part = np.searchsorted(self.borders, frames, side="right")
+        return np.asarray((frames - ends[part]) * BLOCKS // (ends[part + 1] - ends[part]))
 
     @property
     def controls(self) -> Controls:
@@ -107,14 +125,17 @@ class Draw:
 
 
 def make_problem(
-    take: Take, protocol: Protocol, across: Take | None = None, rig: Rig | None = None
+    take: Take | Sequence[Take] | Takes,
+    protocol: Protocol,
+    across: Take | None = None,
+    rig: Rig | None = None,
 ) -> Problem:
     """Check that takes and rig fit together.
 
     Parameters
     ----------
-    take : Take
-        With known poses, best in every frame.
+    take : Take, or sequence of Take
+        With known poses, best in every frame; of several takes in some of them.
     protocol : Protocol
     across : Take, optional
         Test on this one instead: the same controls, in any order.
@@ -124,18 +145,24 @@ def make_problem(
     Raises
     ------
     InputError
-        When a take has no poses, or names are absent.
+        When a take has no poses, names are absent, or takes do not fit together.
     """
-    _check_posed(take)
-    assert take.controls is not None  # poses come with controls
-    test, gram = take, None
+    takes = as_takes(take)
+    for part, name in takes.named:
+        with about(name):
+            _check_true(part)
+    given = takes.joined
+    _check_posed(given)
+    assert given.controls is not None  # poses come with controls
+    test, gram = given, None
     if across is not None:
         with reading("the take to test on"):
+            _check_true(across)
             _check_posed(across)
-            test = _with_controls(across, take.controls)
+            test = _with_controls(across, given.controls)
     if rig is not None:
-        gram = vertex_gram(rig, take.controls)
-    return Problem(take, test, protocol, gram)
+        gram = vertex_gram(rig, given.controls)
+    return Problem(given, test, protocol, gram, takes.starts[1:-1])
 
 
 def draw(problem: Problem, labels: int, unlabelled: int, repeat: int) -> Draw:
@@ -201,7 +228,7 @@ def pools(problem: Problem, repeat: int) -> tuple[IntArray, IntArray]:
     if problem.across:
         tested = np.flatnonzero(_observed(problem.test))
     elif problem.protocol.split == "block":
-        own = (trained * BLOCKS // len(problem.take) + repeat) % 2 == 0
+        own = (problem.blocks(trained) + repeat) % 2 == 0
         trained, tested = trained[own], trained[~own]
     else:
         tested = trained
@@ -271,6 +298,9 @@ def _check_posed(take: Take) -> None:
         raise InputError(
             "/target/params", "known poses", "none", "Evaluate on a take with the true poses."
         )
+
+
+def _check_true(take: Take) -> None:
     predicted = predicted_poses(take)
     if predicted:
         found = f"{plural(predicted, 'pose')} that a model predicted"

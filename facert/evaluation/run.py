@@ -99,6 +99,7 @@ def fingerprint(problem: Problem, settings: Settings | None = None) -> str:
     digest = hashlib.sha256(repr((VERSION, problem.protocol, problem.across, given)).encode())
     for take in (problem.take, problem.test):
         _add_take(digest, take)
+    digest.update(problem.borders.tobytes())
     if problem.gram is not None:
         digest.update(problem.gram.tobytes())
     return digest.hexdigest()

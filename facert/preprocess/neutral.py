@@ -8,6 +8,7 @@ is above it stretched, so that a closed lid stays a closed lid.
 from __future__ import annotations
 
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from facert.errors import InputError
 
 log = logging.getLogger(__name__)
 
+_FRAMES = re.compile(r"[\d.,: ]+")
+_OF_FILE = re.compile(r"(.+?):([\d.,: ]+)")
 RESTLESS = 0.3
 """Motion of this share of the take's is no rest."""
 FULL = 1.0
@@ -100,9 +103,7 @@ def rest_frames(text: str | None, takes: Takes) -> list[IntArray | None]:
     """
     found: list[IntArray | None] = [None] * len(takes.parts)
     for place, part in enumerate((text or "").split(";") if text is not None else ()):
-        name, colon, frames = part.strip().rpartition(":")
-        if colon and name.rpartition("..")[2].isdecimal() and frames.isdecimal():
-            name, frames = "", part.strip()  # a range with a step
+        name, frames = _split(part.strip())
         which = _named(name, takes) if name else place
         if which >= len(found):
             expected = plural(len(found), "take")
@@ -112,6 +113,16 @@ def rest_frames(text: str | None, takes: Takes) -> list[IntArray | None]:
         expected, fix = f"frames of {takes.names[0]} as well", "Others are calibrated to the first."
         raise InputError("neutral", expected, repr(text), fix)
     return found
+
+
+def _split(text: str) -> tuple[str, str]:
+    """The file and the frames of FILE:FRAMES; frames alone have none, though they may have a step.
+
+    >>> _split("a.h5:0..20:2"), _split("0..20:2")
+    (('a.h5', '0..20:2'), ('', '0..20:2'))
+    """
+    found = None if _FRAMES.fullmatch(text) else _OF_FILE.fullmatch(text)
+    return ("", text) if found is None else (found[1], found[2])
 
 
 def _named(name: str, takes: Takes) -> int:

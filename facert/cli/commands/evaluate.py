@@ -23,6 +23,7 @@ from facert.cli.shared.options import (
     file_option,
     option,
 )
+from facert.cli.shared.takes import BUILT_IN, listed_files, short_names
 from facert.data.ranges import parse_range
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -31,7 +32,6 @@ from facert.methods.registry import REGISTRY
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from facert.data.take import Take
     from facert.evaluation.cells import Outcome
     from facert.evaluation.protocol import Problem
     from facert.evaluation.run import Grid
@@ -39,15 +39,16 @@ if TYPE_CHECKING:
     from facert.io.journal import Journal
     from facert.settings import Settings
 
-BUILT_IN = "the built-in take"
 WIDEST = 160
 
 
 def command(
-    take: Annotated[
-        Path | None,
+    paths: Annotated[
+        list[Path] | None,
         argument(
-            "TAKE", "Take with true poses, in all frames or some; by default the built-in one."
+            "TAKE...",
+            "Takes of one actor with true poses, in all frames or some; by default the built-in "
+            "one.",
         ),
     ] = None,
     labels: Annotated[
@@ -73,7 +74,8 @@ def command(
     ] = 0.0,
     missing: Annotated[float, option("Share of the markers to hide in test frames.")] = 0.0,
     split: Annotated[
-        Literal["random", "block"], option("Test on any other frames, or on other blocks of time.")
+        Literal["random", "block"],
+        option("Test on any other frames, or on other blocks of time of each take."),
     ] = "random",
     across: Annotated[Path | None, file_option("Test on this take instead.")] = None,
     rig: RIG = None,
@@ -104,7 +106,8 @@ def command(
     facert eval facert-demo/training.h5 --methods ridge,nearest --repeats 3
     facert eval --labels 10..40 --json figures.json --plot figures.png
     """
-    require_inputs(take, across, rig)
+    paths = paths or []
+    require_inputs(*paths, across, rig)
     if json_path is not None:
         require_report(json_path, overwrite)
     if plot is not None:
@@ -112,13 +115,15 @@ def command(
     if across is not None and split != "random":
         raise typer.BadParameter("--across tests on another take: --split does not apply")
 
+    from facert.data.matching_takes import as_takes
+    from facert.demo import training_take
     from facert.evaluation.advice import advise
     from facert.evaluation.defaults import chosen_grid
     from facert.evaluation.figures import plot_errors
     from facert.evaluation.protocol import Protocol, make_problem
     from facert.evaluation.run import journal_beside
     from facert.evaluation.table import summarise
-    from facert.io.formats import read_rig_file, targets_for
+    from facert.io.formats import read_rig_file, read_take_file, targets_for
     from facert.models.device import find_device
     from facert.preprocess.label_checks import warn_of_labels
     from facert.settings import Settings
@@ -129,12 +134,13 @@ def command(
         find_device(device)
     settings = Settings(device=device)
     protocol = Protocol(split, noise, missing, test_frames, seed)
-    of_take, of_across = targets_for(target, take, across)
-    with reading(take or BUILT_IN):
+    *keys, of_across = targets_for(target, *paths, across)
+    takes = [read_take_file(path, target=key) for path, key in zip(paths, keys, strict=True)]
+    with reading(listed_files(paths)):
         problem = make_problem(
-            _read(take, of_take),
+            as_takes(takes or training_take(posed=None), (), short_names(paths)),
             protocol,
-            None if across is None else _read(across, of_across),
+            None if across is None else read_take_file(across, target=of_across),
             None if rig is None else read_rig_file(rig, shapes),
         )
         warn_of_labels(problem.take)
@@ -142,10 +148,16 @@ def command(
         journal = None if json_path is None else journal_beside(json_path, problem, settings)
         outcomes = _run(problem, grid, settings, jobs, journal)
     rows = summarise(outcomes, protocol)
-    title = _title(take, target, across, problem, grid)
+    title = _title(paths, target, across, problem, grid)
     console.out.print(_table(rows, title))
     if json_path is not None:
-        files = {"take": take, "target": target, "across": across, "rig": rig, "shapes": shapes}
+        files = {
+            "take": listed_files(paths) if paths else None,
+            "target": target,
+            "across": across,
+            "rig": rig,
+            "shapes": shapes,
+        }
         content = {"settings": _facts(files, problem, grid), "rows": list(map(asdict, rows))}
         save_json(content, json_path, overwrite)
     if plot is not None and all(row.rms is None for row in rows):
@@ -195,20 +207,13 @@ def _methods(text: str) -> tuple[str, ...]:
     return names
 
 
-def _read(path: Path | None, target: str | None) -> Take:
-    from facert.demo import training_take
-    from facert.io.formats import read_take_file
-
-    return training_take(posed=None) if path is None else read_take_file(path, target=target)
-
-
 def _title(
-    take: Path | None, target: str | None, across: Path | None, problem: Problem, grid: Grid
+    paths: Sequence[Path], target: str | None, across: Path | None, problem: Problem, grid: Grid
 ) -> str:
     protocol = problem.protocol
-    name = BUILT_IN if take is None else take.name
+    name = " and ".join(short_names(paths)) or BUILT_IN
     parts = [
-        name if take is None or target is None else f"{name} ({target})",
+        name if not paths or target is None else f"{name} ({target})",
         f"tested on {across.name}" if across is not None else f"{protocol.split} split",
         plural(grid.repeats, "draw"),
     ]
