@@ -10,19 +10,29 @@ from facert.data.arrays import FloatArray
 from facert.data.text import plural
 from facert.evaluation.cells import Outcome
 from facert.evaluation.paired import MeanWithError, errors_by_method
+from facert.settings import Settings
 
+DEFAULT = Settings().method
 LITTLE = 0.05  # a smaller gain is not worth the work of posing
 FIRM = 5  # draws from which on advice can stand alone
 RECENT = 3  # numbers of labels that the gain of more is judged by
 
 
-def advise(outcomes: Sequence[Outcome]) -> str:
+def advise(outcomes: Sequence[Outcome], tested: int | None = None, chosen: bool = False) -> str:
     """Advice from all outcomes of an evaluation.
 
-    The method is the one with the least geometric mean of the RMS over labels and repeats, with
-    the most unlabelled data, among those that always ran (but for numbers of labels with which
-    none can). Methods are compared on the same draws: another one does as well if its distance
-    over the repeats is within one standard error.
+    The method is the one with the least mean RMS at the most labels, the number that is nearest to
+    what the take has: the table's number. With the most unlabelled data, among the methods that
+    always ran (but for numbers of labels with which none can). The default is named unless another
+    is ahead by more than a standard error of the difference over the same draws.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    tested : int, optional
+        Frames that each draw was tested on.
+    chosen : bool
+        Whether these were chosen to be posed, and are no ordinary ones.
     """
     most = max(outcome.cell.unlabelled for outcome in outcomes)
     outcomes = [outcome for outcome in outcomes if outcome.cell.unlabelled == most]
@@ -30,13 +40,24 @@ def advise(outcomes: Sequence[Outcome]) -> str:
     errors = errors_by_method([o for o in outcomes if o.cell.labels in labels])
     if not errors:
         return "No method could run every draw: see the notes below the table."
-    logs = {method: np.log(table).mean(axis=0) for method, table in errors.items()}
-    ranked = sorted(logs, key=lambda method: float(logs[method].mean()))
-    chosen = ranked[0]
-    equals = [other for other in ranked[1:] if _ties(logs[other] - logs[chosen])]
+    last = {method: table[-1] for method, table in errors.items()}
+    best = min(last, key=lambda method: float(last[method].mean()))
+    named = DEFAULT if DEFAULT in last and not _beaten(last[DEFAULT] - last[best]) else best
+    equals = [other for other in last if other != named and not _beaten(last[other] - last[named])]
+    equals.sort(key=lambda method: float(last[method].mean()))
     as_good = f" ({' and '.join(equals)} within one standard error of it)" if equals else ""
-    advice = f"Use {chosen} for this take{as_good}. {_about_labels(labels, errors[chosen])}"
-    return advice if errors[chosen].shape[1] >= FIRM else f"{advice} Draws are few: see --repeats."
+    parts = [f"Use {named} for this take{as_good}.", _about_labels(labels, errors[named])]
+    parts += [] if tested is None else [_about_tests(tested, chosen)]
+    parts += ["Draws are few: see --repeats."] if errors[named].shape[1] < FIRM else []
+    return " ".join(parts)
+
+
+def _about_tests(tested: int, chosen: bool) -> str:
+    """What the error is of."""
+    frames = f"Tested on {plural(tested, 'posed frame')} a draw"
+    if not chosen:
+        return f"{frames}."
+    return f"{frames}, which are extremes if they were suggested: ordinary frames err less."
 
 
 def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
@@ -53,7 +74,7 @@ def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
     return f"{seen}; at this rate {2 * labels[-1]} labels would take off another {gain:.0%}."
 
 
-def _ties(behind: FloatArray) -> bool:
-    """Whether the mean of a difference, one number a repeat, is within its standard error."""
+def _beaten(behind: FloatArray) -> bool:
+    """Whether the mean of a difference, one number a draw, is above its standard error."""
     distance = MeanWithError.of(behind)
-    return distance.value <= distance.se
+    return distance.value > (0.0 if np.isnan(distance.se) else distance.se)

@@ -6,7 +6,7 @@ import logging
 import time
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from facert.errors import FacertError
 from facert.evaluation.metrics import Scores, score
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
 from facert.models.threads import threads_for
+from facert.preprocess.training_set import MIN_LABELS
 from facert.retarget.options import AS_IT_IS
 from facert.retarget.training import train
 from facert.settings import Settings
@@ -102,6 +103,7 @@ def cell_settings(problem: Problem, cell: Cell, settings: Settings) -> Settings:
 
 
 def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) -> Outcome:
+    _warm_up(problem, settings)
     training = training_take(problem, chosen, cell.repeat)
     frames = held_out_take(problem, chosen, cell.repeat)
     began = time.perf_counter()
@@ -119,6 +121,21 @@ def _evaluate(problem: Problem, cell: Cell, chosen: Draw, settings: Settings) ->
         fit_seconds=trained - began,
         frame_ms=1e3 * (ended - trained) / len(frames),
     )
+
+
+_warm: set[str] = set()
+"""Methods that this process has run: the first run of each imports its libraries."""
+
+
+def _warm_up(problem: Problem, settings: Settings) -> None:
+    """Run a method once on little data, so that no import counts in the time of the first cell."""
+    if settings.method in _warm:
+        return
+    _warm.add(settings.method)
+    with suppress(FacertError):
+        few = draw(problem, MIN_LABELS, 0, 0)
+        short = replace(settings, unlabelled=0, max_iterations=1)
+        train(training_take(problem, few, 0), short).retarget(held_out_take(problem, few, 0))
 
 
 @contextmanager

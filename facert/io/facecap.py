@@ -16,7 +16,7 @@ from facert.data.names import canonical
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError, reading
-from facert.io.lines import Line, check_width, read_lines, to_numbers
+from facert.io.lines import Line, check_width, read_lines, to_numbers, without_cut_end
 
 log = logging.getLogger("facert")
 
@@ -37,6 +37,7 @@ def read_facecap(path: Path) -> Take:
         rows = _without_trailing_comma([row for row in lines if row.cells[0] == "k"])
         if not rows:
             raise InputError("file", "lines of frames (k,...)", "none", "Export it again.")
+        rows = without_cut_end(rows)
         header = ["k", "milliseconds", *(f"pose {i}" for i in range(1, 11)), *names]
         check_width(rows, header)
         columns = [_CLOCK, *range(_SHAPES, len(header))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +16,18 @@ from facert.data.text import plural
 from facert.errors import InputError
 from facert.io.guarded import encoding_of, existing_file, read_text
 
+log = logging.getLogger("facert")
+
 MAX_HEADER = 2**20
 _PREAMBLE = 20  # lines before the header, at most
 SEPARATORS = ",;\t"
+_ALIKE = 20  # rows before the last one that it is compared with
+_FIXED = 4  # decimals from which on all numbers of a column have as many by intent
 
 # Quoted cells, in which separators do not count.
 _QUOTED = re.compile(r'"(?:[^"]|"")*"')
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 
 
@@ -148,6 +154,34 @@ def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
     for row in rows:
         if len(row.cells) != len(header):
             raise row.error("", f"{len(header)} cells as in the header", f"{len(row.cells)}")
+
+
+def without_cut_end(rows: Sequence[Line]) -> list[Line]:
+    """The rows of a recording without a last one that was not finished, which the log names.
+
+    It has fewer cells than all of those before it, or its last number stops short: a recorder that
+    is killed leaves such a row. Rows in the middle are never left out.
+    """
+    *before, last = rows[-_ALIKE - 1 :]
+    if len(before) < 2 or len({len(row.cells) for row in before}) > 1:
+        return list(rows)
+    width, cells = len(before[0].cells), last.cells
+    if len(cells) > width or (len(cells) == width and not _stops_short(last, before)):
+        return list(rows)
+    log.warning("line %d, the last, is not finished and left out", last.number)
+    return list(rows[:-1])
+
+
+def _stops_short(last: Line, before: Sequence[Line]) -> bool:
+    """Whether the last cell of a row is the beginning of a number like those above it."""
+    cell, above = last.cells[-1].strip(), [row.cells[-1].strip() for row in before]
+    if not cell or not all(map(_NUMBER.fullmatch, above)):
+        return False
+    decimals = {len(text.partition(".")[2]) for text in above}
+    # Who writes zeros at the end writes them always.
+    fixed = len(decimals) == 1 and min(decimals) >= _FIXED and any(t[-1] == "0" for t in above)
+    short = fixed and len(cell.partition(".")[2]) < min(decimals)
+    return short or _NUMBER.fullmatch(cell) is None
 
 
 def to_numbers(rows: Sequence[Line], header: Sequence[str], columns: Sequence[int]) -> FloatArray:

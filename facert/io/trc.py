@@ -26,7 +26,7 @@ from facert.data.take import Source, Take
 from facert.data.text import plural, printable
 from facert.errors import InputError, reading
 from facert.io.guarded import read_old_text
-from facert.io.lines import Line, to_numbers, with_points
+from facert.io.lines import Line, to_numbers, with_points, without_cut_end
 
 log = logging.getLogger("facert")
 
@@ -51,7 +51,7 @@ def read_trc(path: Path) -> Take:
         lines = [(number, text) for number, text in enumerate(texts, start=1) if text.strip()]
         head = next((i for i, (_, text) in enumerate(lines[:8]) if _LEAD.match(text)), 3)
         facts = _facts(lines, head)
-        rows = _rows(lines[head + 1 :])
+        rows = without_cut_end(_rows(lines[head + 1 :]))
         names = _names(lines[head], rows)
         rows = [Line(row.number, _filled(row, len(names))) for row in _aligned(rows, len(names))]
         columns = ["Frame#", "Time", *(f"{name}.{axis}" for name in names for axis in "xyz")]

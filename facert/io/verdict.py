@@ -51,7 +51,8 @@ def read_verdict(path: Path) -> Verdict | None:
 
 
 def _read(file: GuardedFile) -> Verdict:
-    time, doubt, where = (file.numbers(p) for p in ("/time", "/verdict/doubt", "/verdict/reasons"))
+    time, doubt = file.numbers("/time"), file.numbers("/verdict/doubt")
+    where = file.flags("/verdict/reasons")
     require_shape(doubt.shape, time.shape, "/verdict/doubt", _FIX)
     require_finite(doubt, "/verdict/doubt", _FIX)
     words = [file.names(f"/verdict/{word}s") for word in _WORDS]

@@ -144,7 +144,7 @@ def _unsure(
     if mask.any():
         level = level_of(float(mask.mean()), UNSURE_SHARE, np.inf)
         text = f"standard deviation {unsure[mask].mean():.0%} of the range, {usual:.0%} is usual, "
-        cure = "often hidden markers: fill them, or pose frames there"
+        cure = "fill what is hidden there, or pose frames: facert suggest TAKE --have MODEL"
         text += found_in(mask, time)
         yield Reason("unsure", level, text, cure, np.flatnonzero(mask))
 

@@ -120,7 +120,7 @@ def command(
     from facert.evaluation.advice import advise
     from facert.evaluation.defaults import chosen_grid
     from facert.evaluation.figures import plot_errors
-    from facert.evaluation.protocol import Protocol, make_problem
+    from facert.evaluation.protocol import Protocol, draw, make_problem
     from facert.evaluation.run import journal_beside
     from facert.evaluation.table import summarise
     from facert.io.formats import read_rig_file, read_take_file, targets_for
@@ -166,7 +166,9 @@ def command(
         save_picture(plot_errors(rows, title), plot, overwrite)
     if journal is not None:
         journal.remove()
-    console.show(advise(outcomes))
+    tested = len(draw(problem, max(grid.labels), max(grid.unlabelled), 0).test)
+    few = 2 * len(problem.test.labels) < len(problem.test)
+    console.show(advise(outcomes, tested, few))
 
 
 def _run(

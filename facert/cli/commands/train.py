@@ -149,6 +149,7 @@ def command(
         monitors.append(CurveLog(curve, overwrite, continues))
     with reading(listed_files(paths)), ProgressBar() as bar:
         retargeter = facert.train(takes, settings, Monitors(*monitors, bar), begin)
+    retargeter = replace(retargeter, takes=tuple(path.name for path in paths))
     retargeter.save(output, overwrite_model)
     status = retargeter.figures.get("status")
     if checkpoint is not None and status in ("converged", "stalled"):
@@ -240,6 +241,11 @@ def _print_table(retargeter: Retargeter, output: Path) -> None:
             _shown(value) if isinstance(value, float) else str(value),
         )
     console.out.print(table)
+    if any("cross-validation" in name for name in figures):
+        text = (
+            "the error at poses left out is that of posed frames, mostly extremes, and not that of"
+        )
+        console.log.info("%s a shot: for that see what facert retarget says of it", text)
 
 
 def _shown(value: float) -> str:

@@ -27,7 +27,11 @@ class _StderrHandler(logging.Handler):
         err.print(prefix + "\n".join(lines), style="yellow" if warning else None, markup=False)
 
 
-_FIGURES = {"seconds": "training seconds", "motion a frame": "motion per frame"}
+_FIGURES = {
+    "seconds": "training seconds",
+    "motion a frame": "motion per frame",
+    "cross-validation error": "error at poses left out",
+}
 
 
 def figure_label(name: str) -> str:

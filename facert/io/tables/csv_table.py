@@ -39,6 +39,7 @@ from facert.io.lines import (
     parse_csv,
     read_header,
     to_numbers,
+    without_cut_end,
 )
 from facert.io.tables.coordinates import markers_among
 from facert.io.tables.curve_table import is_curve_table, read_csv_curves
@@ -93,6 +94,7 @@ def read_table(
         if _is_marked(text):
             return _read_marked(text)
         header, rows = parse_csv(text)
+        rows = rows if sparse else without_cut_end(rows)
         above = marker_header([Line(1, list(header)), *rows])
         if above is not None:
             table = table_of_lines(above.names, above.body)
@@ -152,6 +154,7 @@ def _read_marked(text: str) -> Take:
     """A table whose first cell states what the others are."""
     after = text.index(")") + 1
     header, rows = parse_csv(text, text[after:].lstrip('"')[:1] or ",")
+    rows = without_cut_end(rows)
     check_width(rows, header)
     numbers = to_numbers(rows, header, range(len(header)))
     time, values, names = numbers[:, 0], numbers[:, 1:], header[1:]

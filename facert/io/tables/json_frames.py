@@ -8,12 +8,15 @@ list of numbers, one a name of a list beside the frames.
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from facert.data.column_names import Role, role_of_name
 from facert.errors import InputError
+
+log = logging.getLogger("facert")
 
 Number = int | float
 """Truths are numbers as well."""
@@ -54,10 +57,22 @@ def parsed(text: str) -> Any:
         if len(lines) < 2 or not all(line.lstrip()[0] in "{[" for line in lines):
             raise InputError("file", "JSON", str(error), "Export it again.") from None
     try:
-        return [json.loads(line) for line in lines]
+        return _documents(lines)
     except (ValueError, RecursionError) as error:
         expected = "JSON, whole or in each line"
         raise InputError("lines", expected, str(error), "Export it again.") from None
+
+
+def _documents(lines: Sequence[str]) -> list[Any]:
+    """What each line holds; a last one that was not finished is left out, and logged."""
+    documents = [json.loads(line) for line in lines[:-1]]
+    try:
+        documents.append(json.loads(lines[-1]))
+    except ValueError:
+        if len(documents) < 2:
+            raise
+        log.warning("the last line is not finished and left out")
+    return documents
 
 
 def frames_of(document: Any) -> list[Frame]:

@@ -40,7 +40,7 @@ from facert.data.timecode_column import TimecodeClock, read_timecodes
 from facert.errors import InputError, reading
 from facert.io.atomic import replacing
 from facert.io.guarded import read_beginning
-from facert.io.lines import Line, check_width, read_csv, to_numbers
+from facert.io.lines import Line, check_width, read_csv, to_numbers, without_cut_end
 
 log = logging.getLogger("facert")
 
@@ -78,7 +78,7 @@ def read_livelink(path: Path, fps: float | None = None) -> Take:
             raise InputError(
                 "header", ",".join(_LEADING), ",".join(header[:2]), "Give a Live Link Face CSV."
             )
-        rows = _rows_with_face(rows)
+        rows = without_cut_end(_rows_with_face(rows))
         check_width(rows, header)
         clock = _clock(rows, fps)
         values = to_numbers(rows, header, range(2, len(header)))

@@ -14,15 +14,19 @@ import facert
 from facert.data.rig import Rig
 from facert.data.take import Controls, Take
 from facert.data.text import plural
+from facert.data.verdict import Verdict
 from facert.errors import InputError, reading
 from facert.io.curves import read_json_object
 from facert.io.formats import read_take_file
 from facert.io.hdf5 import RIG_FORMAT, TAKE_FORMAT, stated_format
 from facert.io.registry import OWN_ENDINGS
 from facert.io.rig import read_rig
+from facert.io.verdict import read_verdict
 from facert.pages.report.evaluation_section import read_evaluation
 from facert.pages.report.performance_section import fits, performance_section, truth_among
 from facert.pages.report.sections import Section
+from facert.retarget.model import TrainedModel
+from facert.retarget.verdict import judge
 
 log = logging.getLogger("facert")
 
@@ -31,8 +35,15 @@ CURVES = {"weightMat", "weights"}  # keys of a .json that holds them
 Thing = TypeVar("Thing")
 
 
-def file_section(path: Path, rig: Rig | None = None, truth: Take | None = None) -> Section:
+def file_section(
+    path: Path,
+    rig: Rig | None = None,
+    truth: Take | None = None,
+    model: TrainedModel | None = None,
+) -> Section:
     """The section of one file: an evaluation (.json), else a performance.
+
+    The verdict is that of the file; where it has none, one by the `model`.
 
     Raises
     ------
@@ -43,11 +54,24 @@ def file_section(path: Path, rig: Rig | None = None, truth: Take | None = None) 
         return read_evaluation(path)
     take = read_performance(path)
     with reading(path):
-        return performance_section(path.name, take, rig, truth)
+        return performance_section(path.name, take, rig, truth, _verdict(path, take, model))
+
+
+def _verdict(path: Path, take: Take, model: TrainedModel | None) -> Verdict | None:
+    """The verdict in a file, or by a model of the same controls."""
+    found = read_verdict(path) if path.suffix.lower() in OWN_ENDINGS else None
+    if found is not None or model is None or take.controls is None:
+        return found
+    if take.controls.names != model.controls.names:
+        return None
+    return judge(None, take, model)
 
 
 def folder_sections(
-    folder: Path, rig: Rig | None = None, truth: Take | None = None
+    folder: Path,
+    rig: Rig | None = None,
+    truth: Take | None = None,
+    model: TrainedModel | None = None,
 ) -> tuple[Section, ...]:
     """Sections of all results in a folder; other files are passed over.
 
@@ -74,7 +98,7 @@ def folder_sections(
     known = [rig] if rig is not None else list(_read(rigs, read_rig).values())
     sections = (
         *_read(evaluations, read_evaluation).values(),
-        *_performances(_read(takes, read_performance), known, truth),
+        *_performances(_read(takes, read_performance), known, truth, model),
         *_read(_files(folder, ".safetensors"), _model).values(),
     )
     if not sections:
@@ -102,7 +126,7 @@ def read_performance(path: Path) -> Take:
 
 
 def _performances(
-    takes: dict[Path, Take], rigs: list[Rig], truth: Take | None
+    takes: dict[Path, Take], rigs: list[Rig], truth: Take | None, model: TrainedModel | None
 ) -> Iterator[Section]:
     """The takes that are posed throughout, but for those that are the truth of a result."""
     whole = {path: take for path, take in takes.items() if 0 < len(take) == len(take.labels)}
@@ -114,7 +138,8 @@ def _performances(
         if not any(take is found for found in truths.values()):
             with reading(path):
                 rig = next((one for one in rigs if fits(one, take)), None)
-                yield performance_section(path.name, take, rig, truths.get(path))
+                verdict = _verdict(path, take, model)
+                yield performance_section(path.name, take, rig, truths.get(path), verdict)
 
 
 def _is_result(path: Path, take: Take) -> bool:

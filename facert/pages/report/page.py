@@ -9,16 +9,16 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined, Template
 
 from facert.pages.report.comparison_section import comparison_section
+from facert.pages.report.judged import summary_section
 from facert.pages.report.sections import ReportPage, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
 
 
 def make_report(title: str, sections: tuple[Section, ...]) -> ReportPage:
-    """A report with what made it; several results with a truth are compared first."""
-    comparison = comparison_section(sections)
-    if comparison is not None:
-        sections = (comparison, *sections)
+    """A report with what made it; several takes are judged first, those with a truth compared."""
+    first = [summary_section(sections), comparison_section(sections)]
+    sections = (*(section for section in first if section is not None), *sections)
     return ReportPage(title, sections, {name: version(name) for name in LIBRARIES})
 
 

@@ -9,10 +9,12 @@ from facert.data.rig import Rig
 from facert.data.shared_controls import SharedControls, require_shared, shared_controls
 from facert.data.take import Take
 from facert.data.text import plural
+from facert.data.verdict import Verdict
 from facert.evaluation.metrics import Comparison, compare
 from facert.pages.report.embedding import embedded
+from facert.pages.report.judged import judged
 from facert.pages.report.sections import Picture, Section, Table
-from facert.render.faces import choose_frames, drives, posed_face, require_poses
+from facert.render.faces import Face, choose_frames, drives, posed_face, require_poses
 from facert.render.plots import plot_controls
 from facert.render.sheet import render_sheet
 
@@ -21,11 +23,16 @@ PIXELS = 240  # a face a side: a page shows six beside each other
 
 
 def performance_section(
-    name: str, take: Take, rig: Rig | None = None, truth: Take | None = None
+    name: str,
+    take: Take,
+    rig: Rig | None = None,
+    truth: Take | None = None,
+    verdict: Verdict | None = None,
 ) -> Section:
     """Pictures and facts of a take with poses; with the character's rig its faces as well.
 
-    With a `truth`, the true poses of the same frames, there are errors by part of the face.
+    With a `truth`, the true poses of the same frames, there are errors by part of the face. A
+    `verdict` comes first.
 
     Raises
     ------
@@ -35,6 +42,7 @@ def performance_section(
     poses = require_poses(take)
     shared = None if truth is None else require_shared(truth, take, "Give the truth of this take.")
     pictures: list[Picture] = []
+    faces: list[Face] = []
     if rig is not None:
         faces = [posed_face(take, rig, "character")]
         if truth is not None and shared is not None:
@@ -44,6 +52,8 @@ def performance_section(
     curves = plot_controls(take) if shared is None else plot_controls(shared.result, shared.truth)
     pictures.append(embedded(curves, "The controls that vary most", "svg"))
     section = Section(f"Performance: {name}", "", tuple(pictures), facts=_facts(take, rig))
+    if verdict is not None:
+        section = replace(section, judged=judged(name, take, verdict, faces, rig))
     return section if shared is None else _with_errors(section, shared)
 
 
@@ -92,6 +102,7 @@ def _facts(take: Take, rig: Rig | None) -> dict[str, str]:
         "source": f"{source}, {1 - take.source.valid.mean():.1%} not observed",
         "controls": ", ".join(take.controls.names),
         "rig": "" if rig is None else f"{len(rig.neutral)} vertices, in {rig.units or 'no unit'}",
+        "model": take.model,
         "created by": take.created_by,
     }
     return {name: value for name, value in facts.items() if value}
