@@ -317,7 +317,8 @@ def shape_drivers(
         near = nearest(unknown[0], shapes)
         hint = f" (did you mean {contrasted(near, unknown[0])}?)" if near else ""
         unmatched = f"{unknown[0]!r}{hint}, {len(unknown)} unknown in all"
-        expected, fix = "controls that the rig has a shape for", "Give the rig of its character."
+        expected = "controls that the rig has a shape for"
+        fix = "Give the rig of its character; --drivers maps controls to bones."
         raise InputError("/target/names", expected, unmatched, fix)
     drivers = np.zeros((len(controls), len(shapes)))
     for control, found in enumerate(driven):

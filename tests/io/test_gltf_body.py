@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+import pygltflib as gltf
 import pytest
 from gltf_files import EYE, FACE, Builder, character
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from facert import Controls, Source, Take
@@ -45,6 +48,26 @@ def test_meshes_around_the_face_are_shown_in_their_colours(builder, tmp_path, ca
     assert "without shapes, for pictures only: teeth, eye" in caplog.text
     assert "seen through, so not shown: cornea" in caplog.text
     np.testing.assert_allclose(posed(rig, jawOpen=1)[3:], posed(rig)[3:])
+
+
+def test_a_texture_gives_its_colours_and_a_bad_one_clay(builder, tmp_path) -> None:
+    picture = BytesIO()
+    Image.fromarray(np.uint8([[[0, 0, 255], [0, 255, 0]], [[9, 9, 9], [255, 0, 0]]])).save(
+        picture, "PNG"
+    )
+    document, content = builder.document, np.frombuffer(picture.getvalue(), np.uint8)
+    uv = np.float32([[0.2, 0.2, 0], [0.7, 0.2, 0], [1.7, -0.1, 0]])
+    document.meshes[2].primitives[0].attributes.TEXCOORD_0 = builder.accessor(uv)
+    surface = document.materials[0].pbrMetallicRoughness
+    surface.baseColorTexture = gltf.TextureInfo(index=0)
+    surface.baseColorFactor = None
+    document.textures = [gltf.Texture(source=0)]
+    document.images = [gltf.Image(bufferView=builder.view(content), mimeType="image/png")]
+    rig = read_gltf_rig(builder.save(tmp_path / "in.glb"))
+    np.testing.assert_allclose(rig.whole.colours[6:], [[0, 0, 1], [0, 1, 0], [1, 0, 0]], atol=1e-6)
+    document.images = [gltf.Image(uri="data:image/png;base64,AAAA")]
+    bad = read_gltf_rig(builder.save(tmp_path / "bad.glb"))
+    np.testing.assert_allclose(bad.whole.colours[6:], [CLAY] * 3)
 
 
 def test_the_eye_turns_where_it_is(builder, tmp_path) -> None:

@@ -26,6 +26,7 @@ from facert.io.gltf.parts import (
     welded,
 )
 from facert.io.gltf.scene import Scene
+from facert.io.gltf.textures import texture_colours
 
 log = logging.getLogger("facert")
 
@@ -57,9 +58,10 @@ def body_of(scene: Scene, face: FloatArray, nodes: Sequence[int] = ()) -> Placed
         if _material(scene, one).get("alphaMode") == _SEEN_THROUGH:
             clear[name] = None
             continue
-        part = _cut(placed_mesh(scene, one, nodes=nodes), face)
+        part = placed_mesh(scene, one, nodes=nodes)
+        part = _cut(replace(part, colours=_colours(scene, one, part)), face)
         if len(part.faces):
-            parts.append(replace(part, colours=_colours(scene, one, part)))
+            parts.append(part)
             shown[name] = None
     if shown:
         log.info("without shapes, for pictures only: %s", listed(list(shown), _LISTED))
@@ -91,11 +93,14 @@ def _colours(scene: Scene, one: Primitive, part: PlacedMesh) -> FloatArray:
     """Colours in linear light (V, 3): the vertices' own, else the material's, else clay's."""
     if part.colours is not None:
         return part.colours
-    surface = _material(scene, one).get("pbrMetallicRoughness", {})
-    plain = np.array(CLAY) ** GAMMA
-    if "baseColorTexture" not in surface and "baseColorFactor" in surface:
-        plain = np.array(surface["baseColorFactor"], dtype=np.float64)[:3]
-    return np.tile(plain, (len(part.vertices), 1))
+    material = _material(scene, one)
+    surface = material.get("pbrMetallicRoughness", {})
+    factor = np.array(surface.get("baseColorFactor", [1.0] * 3), dtype=np.float64)[:3]
+    texture = texture_colours(scene.document, material, one.entry["attributes"])
+    if texture is not None:
+        return np.asarray(texture**GAMMA * factor)
+    plain = "baseColorTexture" not in surface and "baseColorFactor" in surface
+    return np.tile(factor if plain else np.array(CLAY) ** GAMMA, (len(part.vertices), 1))
 
 
 def _material(scene: Scene, one: Primitive) -> dict[str, Any]:

@@ -84,7 +84,7 @@ class Document:
     def _view(self, place: dict[str, Any], dtype: str, count: int, width: int) -> NDArray[Any]:
         """Numbers that lie in a buffer, (count, width)."""
         number, offset = _index(place["bufferView"]), _index(place.get("byteOffset", 0))
-        view, content = self.root["bufferViews"][number], self._content(number)
+        view, content = self.root["bufferViews"][number], self.content(number)
         size = np.dtype(dtype).itemsize
         stride = _index(view.get("byteStride", 0)) or width * size
         # Not left to NumPy, which takes an empty buffer to be as large as it needs to be.
@@ -92,7 +92,7 @@ class Document:
             raise ValueError(f"{count} numbers in {len(content)} bytes")
         return np.ndarray((count, width), dtype, content, offset, (stride, size))
 
-    def _content(self, number: int) -> bytes:
+    def content(self, number: int) -> bytes:
         """The bytes of a view, decompressed."""
         view = self.root["bufferViews"][number]
         packed = next(filter(None, map(view.get("extensions", {}).get, MESHOPT)), None)
