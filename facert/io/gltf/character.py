@@ -192,10 +192,9 @@ class Character:
         self._file.root["animations"] = kept
 
     def _log(self, controls: Sequence[str], params: FloatArray, channels: _Channels) -> None:
-        nodes = self._scene.document.root["nodes"]
-        parts = []
+        root, parts = self._scene.document.root, []
         for word, kinds in (("shapes of", ("weights",)), ("nodes", ("rotation", "translation"))):
-            names = dict.fromkeys(_label(nodes, node) for node, kind in channels if kind in kinds)
+            names = dict.fromkeys(_label(root, node) for node, kind in channels if kind in kinds)
             parts += [f"{word} {listed(list(names), _LISTED)}"] if names else []
         log.info("animated: %s", "; ".join(parts) or "nothing")
         still = [name for name, one in zip(controls, params.T, strict=True) if not one.any()]
@@ -264,6 +263,7 @@ def _target_of(channel: dict[str, Any]) -> tuple[Any, Any]:
     return channel["target"].get("node"), channel["target"]["path"]
 
 
-def _label(nodes: Sequence[dict[str, Any]], number: int) -> str:
-    name = nodes[number].get("name")
-    return printable(name) if isinstance(name, str) and name else f"node {number}"
+def _label(root: dict[str, Any], number: int) -> str:
+    node = root["nodes"][number]
+    mesh = root["meshes"][node["mesh"]] if "mesh" in node else {}
+    return str(node.get("name") or mesh.get("name") or f"node {number}")
