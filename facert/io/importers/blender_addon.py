@@ -138,19 +138,22 @@ class FACERT_OT_mark_frames(bpy.types.Operator, ImportHelper):  # type: ignore[m
         "listed": bpy.props.StringProperty(
             name="Or a list", description="Frames such as 5,41,121, in the place of a file"
         ),
+        "take": bpy.props.StringProperty(
+            name="Take", description="Of suggestions for several takes: that of this timeline"
+        ),
     }
 
     def draw(self, context: Any) -> None:
         """Show the settings beside the files."""
         self.layout.prop(self, "listed")
+        self.layout.prop(self, "take")
         _draw(self.layout, context, "start")
 
     def execute(self, context: Any) -> set[str]:
         """Mark the frames; a trouble is reported."""
         scene = context.scene
-        return _report(
-            self, lambda: mark_frames(scene, self.filepath, self.listed, scene.facert.start)
-        )
+        given = (self.filepath, self.listed, self.take, scene.facert.start)
+        return _report(self, lambda: mark_frames(scene, *given))
 
 
 class FACERT_OT_key_poses(bpy.types.Operator, ImportHelper):  # type: ignore[misc]

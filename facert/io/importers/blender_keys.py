@@ -24,9 +24,11 @@ def key_controls(face: Face, points: Mapping[str, Points], anew: bool) -> list[s
     Raises `ScriptError` when the face has none of the controls.
     """
     absent = [c for c in points if not face.blocks(c) and find(c, face.motions) is None]
+    taken = [find(control, face.controls) for control in points]
+    free = [control for control in face.controls if control not in taken]
+    missing = [meant(name, free) for name in absent]
     if len(absent) == len(points):
-        ours = some(face.controls)
-        theirs = some([meant(name, face.controls) for name in absent])
+        theirs, ours = some(missing), some(face.controls)
         raise ScriptError(f"no shape key for {theirs}; those of the objects are {ours}")
     driven, beyond = [], []
     for control, found in points.items():
@@ -38,7 +40,7 @@ def key_controls(face: Face, points: Mapping[str, Points], anew: bool) -> list[s
                 if any(abs(value) > HARD_LIMIT for _, value in found):
                     beyond.append(f"{control!r}")
     _key_nodes(face, points, anew)
-    return _said(face, absent, driven, beyond)
+    return _said(missing, driven, beyond)
 
 
 def keyed_frames(face: Face) -> list[float]:
@@ -56,10 +58,9 @@ def keyed_frames(face: Face) -> list[float]:
     return sorted(found)
 
 
-def _said(face: Face, absent: list[str], driven: list[str], beyond: list[str]) -> list[str]:
-    there = [*face.controls, *face.motions]
+def _said(missing: list[str], driven: list[str], beyond: list[str]) -> list[str]:
     texts = {
-        "no shape key for {}": [meant(name, there) for name in absent],
+        "no shape key for {}": missing,
         "left alone, as drivers of Blender move them: {}": list(dict.fromkeys(driven)),
         "beyond what Blender's sliders hold (are they percent?): {}": list(dict.fromkeys(beyond)),
     }

@@ -96,21 +96,19 @@ def export_poses(
     poses, outside = _posed(scene, face, frames, start)
     if not poses:
         raise ScriptError(f"all frames are before the recording's first, which is at {start:g}")
-    if path.lower().endswith(".h5"):
-        raise ScriptError("Blender writes no .h5: write poses.csv, and facert convert --poses")
-    write_poses(path, poses)
+    write_poses(path, poses, timeline_of(scene).rate)
     said = [f"not in the recording, left out: {some(outside)}"] if outside else []
     shown = some([str(pose.frame) for pose in poses])
     what = f"{plural(len(poses), 'pose')} of {plural(len(face.controls), 'control')}"
     return Report(f"{what}, of frames {shown}", [*face.warnings, *said])
 
 
-def mark_frames(scene: Any, path: str, text: str, start: float) -> Report:
+def mark_frames(scene: Any, path: str, text: str, take: str, start: float) -> Report:
     """Set a marker at each suggested frame, from a file or a text, by time where it is known."""
-    found = listed_frames(text) if text.strip() else read_suggestions(path)
+    found = listed_frames(text) if text.strip() else read_suggestions(path, take.strip())
     known = [(frame, seconds) for frame, seconds in found if seconds is not None]
     if known:
-        _keep(scene, Timeline(_usual_rate(known, scene_rate(scene)), known))
+        _keep(scene, Timeline(_usual_rate([(0, 0.0), *known], scene_rate(scene)), known))
     line, rate = timeline_of(scene), scene_rate(scene)
     for marker in [m for m in scene.timeline_markers if m.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)

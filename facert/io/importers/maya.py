@@ -99,7 +99,7 @@ def export_poses(
                 number, number / (fps or rate), {**_driven_at(time, values), **values}
             )
         kept = [poses[number] for number in sorted(poses) if number >= 0]
-        write_poses(path, kept)
+        write_poses(path, kept, fps or rate)
     except ScriptError as error:
         cmds.warning(f"facert: {error}")
         return

@@ -100,12 +100,14 @@ def read_poses(path: str) -> list[tuple[int | None, float | None, dict[str, floa
     return _reading(path, _read_pose_table)
 
 
-def read_suggestions(path: str) -> list[tuple[int, float | None]]:
+def read_suggestions(path: str, take: str = "") -> list[tuple[int, float | None]]:
     """Frames, and their seconds where they are known, of ``facert suggest --json``, or of a list.
 
-    Raises `ScriptError` when the file is missing, or is none.
+    Of suggestions for several takes those of one are read.
+
+    Raises `ScriptError` when the file is missing, or is none, or does not have that take.
     """
-    return _reading(path, _read_suggestions)
+    return _reading(path, lambda path: _read_suggestions(path, take))
 
 
 def listed_frames(text: str) -> list[tuple[int, float | None]]:
@@ -119,28 +121,51 @@ def listed_frames(text: str) -> list[tuple[int, float | None]]:
     return [(int(number), None) for number in sorted(set(map(int, re.findall(r"\d+", text))))]
 
 
-def write_poses(path: str, poses: Sequence[Pose]) -> None:
-    """Write a table of poses that ``facert convert --poses`` reads; whole or not at all.
+def write_poses(path: str, poses: Sequence[Pose], fps: float) -> None:
+    """Write poses, all of the same controls, as ``facert convert --poses`` reads them.
 
-    Raises `ScriptError` when there are none, or it cannot be written.
+    To a .csv, or to a .h5 where the program's Python has h5py; whole or not at all.
+
+    Raises `ScriptError` when there are none, or they cannot be written.
     """
     if not poses:
         raise ScriptError("no pose to write")
-    names = list(dict.fromkeys(name for pose in poses for name in pose.values))
     temporary = f"{path}.part"
     try:
-        with open(temporary, "w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["frame", "seconds", *names])
-            for pose in poses:
-                values = [pose.values.get(name) for name in names]
-                cells = [
-                    "" if value is None else f"{round(value, 6) + 0.0:.6g}" for value in values
-                ]
-                writer.writerow([pose.frame, f"{pose.seconds:.6f}", *cells])
+        if path.lower().endswith((".h5", ".hdf5")):
+            _write_h5(temporary, poses, fps)
+        else:
+            _write_csv(temporary, poses)
         Path(temporary).replace(path)
     except OSError as error:
         raise ScriptError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _write_csv(path: str, poses: Sequence[Pose]) -> None:
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["frame", "seconds", *poses[0].values])
+        for pose in poses:
+            values = [f"{round(value, 6) + 0.0:.6g}" for value in pose.values.values()]
+            writer.writerow([pose.frame, f"{pose.seconds:.6f}", *values])
+
+
+def _write_h5(path: str, poses: Sequence[Pose], fps: float) -> None:
+    """A take whose frames are the poses, by their seconds."""
+    try:
+        import h5py
+    except ImportError:
+        fix = "write a .csv, which facert convert --poses reads as well"
+        raise ScriptError(f"this program's Python has no h5py for a .h5: {fix}") from None
+    values = [list(pose.values.values()) for pose in poses]
+    with h5py.File(path, "w") as file:
+        file.attrs.update({"format": "facert-take", "format_version": 1, "fps": fps, "units": ""})
+        file["time"] = [pose.seconds for pose in poses]
+        for group, name in (("source", "weights"), ("target", "params")):
+            file[f"{group}/{name}"] = values
+            file.create_dataset(
+                f"{group}/names", data=list(poses[0].values), dtype=h5py.string_dtype()
+            )
 
 
 def keys(curves: Curves, name: str) -> list[Key]:
@@ -237,12 +262,17 @@ def _read_pose_table(path: str) -> list[tuple[int | None, float | None, dict[str
     return _poses(frames, times, _columns(header, rows, {frame, clock}))
 
 
-def _read_suggestions(path: str) -> list[tuple[int, float | None]]:
+def _read_suggestions(path: str, take: str) -> list[tuple[int, float | None]]:
     with open(path, encoding="utf-8-sig") as file:
         text = file.read()
     if not text.lstrip().startswith("{"):
         return listed_frames(text)
     rows = json.loads(text)["frames"]
+    takes = list(dict.fromkeys(row.get("file", "") for row in rows))
+    if len(takes) > 1 or take:
+        if take not in takes:
+            raise ScriptError(f"expected one of the takes {some(takes)}, found {take or 'none'!r}")
+        rows = [row for row in rows if row.get("file", "") == take]
     return sorted((int(row["frame"]), float(row["seconds"])) for row in rows)
 
 

@@ -26,7 +26,7 @@ from facert.io.importers import script
 from facert.io.poses import read_poses
 
 FPS, FRAMES = 30000 / 1001, 40
-NAMES = ("jawOpen", "smileLeft", "smileLetf", "lookIn", "lookOut", "lookUp", "wink")
+NAMES = ("jawOpen", "smileLeft", "brrow", "lookIn", "lookOut", "lookUp", "wink")
 STEPS = np.arange(FRAMES)
 WAVE = np.sin(STEPS / 5)
 VALUES = np.stack(
@@ -82,6 +82,8 @@ def write_files(folder: Path) -> None:
     write_take_file(other, folder / "none.json")
     rows = [{"frame": frame, "seconds": frame / FPS, "share": 0.1} for frame in (30, 5, 12)]
     (folder / "s.json").write_text(json.dumps({"file": "take.csv", "frames": rows}))
+    named = [{"frame": f, "seconds": f / FPS, "file": name} for f, name in ((3, "A"), (9, "B.csv"))]
+    (folder / "two.json").write_text(json.dumps({"files": ["A", "B.csv"], "frames": named}))
     (folder / "fixed.csv").write_text("frame,jawOpen,lookIn,lookOut,lookUp,wink\n"
                                       "5,0.5,0,0.75,0,0.1\n12,0.25,0.5,0,0.4,0.2\n")  # fmt: skip
     (folder / "one.csv").write_text("frame,jawOpen,lookIn\n9,0.125,0.625\n")
@@ -147,7 +149,7 @@ def test_curves_move_all_meshes_bones_objects_and_properties(blender) -> None:
     whole = [rest[0] * w, rest[2] * z, rest[2] * w, rest[0] * z]
     assert shown["ball"] == pytest.approx(whole, abs=1e-5)
     assert shown["bone"] == pytest.approx([0, 0, 0.1 * values["jawOpen"]], abs=1e-5)
-    assert "no shape key for 'smileLetf' (did you mean 'smile.L'?)" in printed
+    assert "no shape key for 'brrow' (did you mean 'brow'?)" in printed
     assert "no bone or object for drivers: 'Tongue'" in printed
     assert "40 frames at 29.97 frames/s on 29.97 frames/s, keyed on Head, Teeth" in printed
 
@@ -158,7 +160,7 @@ def test_the_poses_of_keyed_frames_are_those_that_came_in(blender) -> None:
     assert [row["frame"] for row in rows] == list(range(FRAMES))
     spelled = {**{name: name for name in NAMES}, "jawOpen": "jawopen", "smileLeft": "smile.L"}
     for column, name in enumerate(NAMES):
-        if name != "smileLetf":
+        if name != "brrow":
             read = [row[spelled[name]] for row in rows]
             np.testing.assert_allclose(read, VALUES[:, column], atol=2e-5)
     assert {row["brow"] for row in rows} == {0.0}
@@ -173,6 +175,7 @@ def test_suggested_frames_are_marked_by_time_at_another_rate(blender) -> None:
     assert found["marked"] == ["FINISHED"]
     places = [[f"facert {f}", 101 + round(f / FPS * 24)] for f in (5, 12, 30)]
     assert found["markers"] == places
+    assert found["of two"] == [["facert 9", 101 + round(9 / FPS * 60)]]
     assert found["list"] == [["facert 3", 101 + 6], ["facert 9", 101 + 18]]
 
 
@@ -214,7 +217,7 @@ MESSAGES = {
     "nothing keyed": "no frame is keyed: key the poses first",
     "before the start": "all frames are before the recording's first, which is at 101",
     "bad list": "expected frames such as 5,41,121, found 'five'",
-    "h5": "Blender writes no .h5",
+    "no take": "two.json: expected one of the takes A, B.csv, found 'none'",
     "nothing selected": "no object is selected",
     "linked": "Head is linked from a file: make a library override of it",
 }
@@ -245,6 +248,14 @@ def test_drivers_of_a_file_count_where_its_python_reads_toml(blender) -> None:
     _, found, _ = blender
     there = found["chosen drivers"]
     assert there == ["FINISHED"] or "facert export-script --drivers" in there
+
+
+def test_poses_go_to_hdf5_where_its_python_can(blender) -> None:
+    folder, found, _ = blender
+    if found["h5"] == ["FINISHED"]:
+        assert len(read_poses(folder / "poses.h5").values) == FRAMES
+    else:
+        assert "this program's Python has no h5py for a .h5: write a .csv" in found["h5"]
 
 
 def test_poses_of_blender_become_labels(blender, tmp_path) -> None:

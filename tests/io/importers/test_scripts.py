@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from facert.data.labelling import labelled
 from facert.data.names import ARKIT_SHAPES
 from facert.data.take import Source, Take
 from facert.io.curves import write_curves
@@ -19,6 +20,7 @@ from facert.io.formats import write_take_file
 from facert.io.importers import PROGRAMS, script
 from facert.io.importers.motions import added, controls_at, motions_of
 from facert.io.importers.shared import (
+    Pose,
     ScriptError,
     Timeline,
     find,
@@ -26,6 +28,7 @@ from facert.io.importers.shared import (
     listed_frames,
     read_curves,
     spelling,
+    write_poses,
 )
 from facert.io.poses import read_poses
 
@@ -253,6 +256,21 @@ def test_controls_are_found_from_what_they_move() -> None:
         assert found == pytest.approx(whole, abs=1e-9)
     sums = added(motions, {"lookIn": 0.5, "lookOut": 0.25, "lookUp": 0.0})
     assert controls_at(motions, sums, {"lookIn": 0.5})["lookOut"] == pytest.approx(0.25, abs=1e-3)
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5"])
+def test_poses_are_labels_of_the_recording(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"poses.{ending}"
+    poses = [Pose(frame, frame / 25, {"jäw": frame / 10, "eye": 0.5}) for frame in (3, 8)]
+    write_poses(str(path), poses, 25.0)
+    recording = Take(np.arange(10) / 25, Source(np.zeros((10, 1)), ("a",)), fps=25.0)
+    take = labelled(recording, read_poses(path))
+    assert take.labels.tolist() == [3, 8]
+    assert take.controls is not None
+    assert take.params is not None
+    assert take.controls.names == ("jäw", "eye")
+    assert take.params[take.labels].tolist() == [[0.3, 0.5], [0.8, 0.5]]
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 
 @pytest.mark.parametrize("text", ["5,41,121", "...\nin order of time: 121 5;41\n", "5, 5,41,121,"])
