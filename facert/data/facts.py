@@ -119,6 +119,7 @@ def _of_target(take: Take) -> dict[str, Any] | None:
         "constant": _pick(names, ~active),
         "limits": None if limits is None else tuple(map(_ends, limits.tolist())),
         "deviations": take.std is not None,
+        "corrections": None if take.corrections is None else len(take.corrections.frames),
         "animation": 0 if take.animation is None else len(take.animation),
     }
 

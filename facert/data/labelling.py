@@ -97,7 +97,14 @@ def of_character(take: Take, controls: Controls) -> Take:
         None if values is None else _spread(values, places, len(controls.names))
         for values in (take.params, take.std, take.animation)
     )
-    return replace(take, controls=controls, params=params, std=std, animation=animation)
+    return replace(
+        take,
+        controls=controls,
+        params=params,
+        std=std,
+        animation=animation,
+        corrections=None,
+    )
 
 
 def _places(names: Sequence[str], controls: Controls, field: str) -> list[list[int]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray, rms
+from facert.data.labelling import without_predicted
 from facert.data.limits import bounds_of, rig_controls
 from facert.data.names import match
 from facert.data.rig import Rig
@@ -206,18 +207,17 @@ def character_controls(model: Retargeter | None, take: Take | None, rig: Rig | N
 def _labels_only(take: Take, controls: Controls) -> Take:
     """The take with its labels and animation in the order of the controls.
 
-    Poses with a standard deviation were predicted: they are no labels.
+    Predicted poses are no labels; corrections of a result are.
     """
+    take = without_predicted(take)
     if take.controls is None:
         return replace(take, controls=controls)
     columns = match(controls.names, take.controls.names, "/target/names")
-    params = None if take.params is None or take.std is not None else take.params[:, columns]
+    params = None if take.params is None else take.params[:, columns]
     animation = None if take.animation is None else take.animation[:, columns]
     return replace(
         take,
         controls=controls,
         params=params,
-        std=None,
         animation=animation,
-        corrections=None,
     )

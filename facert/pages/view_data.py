@@ -69,8 +69,13 @@ class Performance:
     @cached_property
     def std(self) -> FloatArray | None:
         """Predicted standard deviation of the pose, root mean square over controls, (T,)."""
-        std = self.take.std
+        std = self._deviations
         return None if std is None else np.asarray(np.sqrt(np.mean(std**2, axis=1)))
+
+    @cached_property
+    def _deviations(self) -> FloatArray | None:
+        """Predicted standard deviations, (T, P); 0 where a pose is somebody's."""
+        return None if self.take.std is None else np.nan_to_num(self.take.std)
 
     @cached_property
     def true_params(self) -> FloatArray | None:
@@ -102,9 +107,9 @@ class Performance:
 
     def vertex_std(self, frame: int) -> FloatArray | None:
         """Predicted standard deviation of each vertex, (V,), with independent controls."""
-        if self._squared_shapes is None or self.take.std is None:
+        if self._squared_shapes is None or self._deviations is None:
             return None
-        return np.asarray(np.sqrt(self.take.std[frame] ** 2 @ self._squared_shapes))
+        return np.asarray(np.sqrt(self._deviations[frame] ** 2 @ self._squared_shapes))
 
     @cached_property
     def _squared_shapes(self) -> FloatArray | None:

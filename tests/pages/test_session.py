@@ -89,6 +89,15 @@ def test_predicted_poses_are_no_labels(make_take) -> None:
     assert not len(session.take.labels)
 
 
+def test_corrections_of_a_result_are_labels(make_take) -> None:
+    take = make_take()
+    model = facert.train(take, facert.Settings(method="gpr"))
+    shot = facert.correct(model.retarget(take), {7: {"jaw": 0.1}}, only=True)
+    session = PosingSession(model.controls, shot, model)
+    assert session.take.labels.tolist() == [7]
+    assert session.take.params[7, 0] == 0.1
+
+
 def test_controls_are_matched_by_name(make_take) -> None:
     take = make_take()
     turned = Controls(NAMES[::-1])

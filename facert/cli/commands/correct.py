@@ -31,6 +31,9 @@ def command(
     wanted: Annotated[
         list[str] | None, option("A control; again for more.", "--set", metavar="NAME=VALUE")
     ] = None,
+    confirm: Annotated[
+        bool, option("The frames of --frame are right as they are: labels for train.", "--confirm")
+    ] = False,
     poses: Annotated[
         Path | None,
         file_option("Whole poses instead, by a column frame or by time: of Blender, or a take."),
@@ -74,8 +77,8 @@ def command(
     facert correct retargeted.h5 --frame 40 --set smile=0.6 --overwrite
     facert correct retargeted.h5 --list
     """
-    asked = _asked(frames, wanted or [], poses, remove, show)
-    if asked != "--frame" and (hold or only):
+    _require_one(frames, bool(wanted) + confirm, poses, remove, show)
+    if (hold or only) and not wanted:
         raise typer.BadParameter("--hold and --only are for --frame with --set")
     require_inputs(path, poses)
     take = _read(path)
@@ -88,27 +91,23 @@ def command(
             made = _without(take, remove)
         elif poses is not None:
             made = _with_poses(take, poses, width)
+        elif confirm:
+            made = _confirmed(take, frames)
         else:
             given = parse_controls(wanted or [])
             made = _with_set(take, frames, given, width, hold or [], only, model)
     _write(take, made, output)
 
 
-def _asked(frames: str, wanted: list[str], poses: Path | None, remove: str, show: bool) -> str:
-    """The one thing that is asked for."""
-    things = {
-        "--frame": frames or wanted,
-        "--poses": poses,
-        "--remove": remove,
-        "--list": show,
-    }
-    asked = [name for name, given in things.items() if given]
-    if len(asked) != 1:
+def _require_one(frames: str, ways: int, poses: Path | None, remove: str, show: bool) -> None:
+    """Refuse nothing at all, two things at once, and a frame without what becomes of it."""
+    if sum(map(bool, (frames or ways, poses, remove, show))) != 1:
         text = "give --frame with --set NAME=VALUE, or one of --poses, --remove and --list"
         raise typer.BadParameter(text)
-    if asked == ["--frame"] and not (frames and wanted):
-        raise typer.BadParameter("give both --frame and --set NAME=VALUE")
-    return asked[0]
+    if bool(frames) != bool(ways):
+        raise typer.BadParameter("give both --frame and --set NAME=VALUE (or --confirm)")
+    if ways > 1:
+        raise typer.BadParameter("--confirm leaves a frame as it is: give it without --set")
 
 
 def _read(path: Path) -> Take:
@@ -150,6 +149,17 @@ def _with_set(
     wanted = dict.fromkeys(parse_frames(frames, "--frame"), given)
     width = WIDTH if width is None else width
     return facert.correct(take, wanted, character, width=width, hold=hold, only=only)
+
+
+def _confirmed(take: Take, frames: str) -> Take:
+    """The take with the poses of some frames as they are, now somebody's."""
+    import facert
+    from facert.data.ranges import parse_frames
+
+    asked = parse_frames(frames, "--frame")
+    if take.params is None or asked[-1] >= len(take):
+        return facert.correct(take, dict.fromkeys(asked, {}), only=True)  # it says why not
+    return facert.correct(take, {frame: take.params[frame] for frame in asked})
 
 
 def _with_poses(take: Take, path: Path, width: float | None) -> Take:
