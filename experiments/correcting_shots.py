@@ -7,8 +7,8 @@ frames, a second apart, are set to the truth with `facert.correct`. Measured ove
 the RMS of the shot
 
 - as it was, and with the corrections alone (a window of 0 s), or blended over 0.25 to 2 s,
-- after training anew on the first take and the corrections as labels of the result, against the
-  same labels in the recording itself, whose noise is still in; and with twice as many suggested
+- after training anew on the first take and the corrections, as labels of the source that the model
+  has cleaned, and of the recording, which a result keeps for that; and with twice as many suggested
   frames that are labelled as they were predicted,
 
 and in the window of 0.5 s the RMS of the errors in standard deviations that the result states,
@@ -75,7 +75,8 @@ class Shot:
         frames = facert.suggest_frames(bare, CONFIRMED * len(corrected)).frames.tolist()
         confirmed = {frame: self.result.params[frame] for frame in frames}
         made = facert.correct(self.result, confirmed | dict(corrected))
-        return facert.train([self.taught, made]).retarget(bare)
+        as_recorded = replace(made, source=self.truth.source)
+        return facert.train([self.taught, as_recorded]).retarget(bare)
 
     def errors(self, result: Take) -> FloatArray:
         """Errors of a result, (T, P)."""
@@ -117,14 +118,11 @@ def measure(shot: Shot, count: int) -> dict[str, float]:
         made = facert.correct(shot.result, truth, width=width)
         found[f"{width:g} s"] = rms(shot.errors(made)[others])
     made = facert.correct(shot.result, truth)
-    labels = {"result": made, "recording": with_poses(shot.truth, frames)}
+    labels = {"anew, cleaned": made, "anew": with_poses(shot.truth, frames)}
     for name, labelled in labels.items():
         model = facert.train([shot.taught, labelled])
         anew = model.retarget(replace(shot.truth, params=None))
-        found[f"anew, {name}"] = rms(shot.errors(anew)[others])
-        if name == "result":
-            again = facert.correct(anew, truth)
-            found["anew and blended"] = rms(shot.errors(again)[others])
+        found[name] = rms(shot.errors(anew)[others])
     found["anew, others confirmed"] = rms(shot.errors(shot.with_confirmed(truth))[others])
     return found | in_deviations(shot, made, frames)
 

@@ -23,8 +23,9 @@ attributes                                 format, format_version, fps, units, c
 ==================  =====================  =========================================================
 
 ``/source/std``, ``/source/filled`` and ``/source/head``, and the verdict of `facert.io.verdict`,
-are written beside a take for who looks for them; reading passes over these and over anything else
-that it does not know.
+are written beside a take for who looks for them, as is ``/recorded/``, the source of a result
+before it was cleaned, for who learns from its corrections; reading passes over these and over
+anything else that it does not know.
 
 A file with corrections has format version 2, any other 1: who does not know of corrections would
 take predicted poses for somebody's.
@@ -34,6 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -53,6 +55,7 @@ from facert.io.hdf5 import (
     open_guarded,
     stated_format,
 )
+from facert.io.registry import OWN_ENDINGS
 
 Beside = Mapping[str, NDArray[Any] | tuple[str, ...]]
 """Arrays, and lists of text, by their paths in a file."""
@@ -97,6 +100,27 @@ def holds_recording(path: Path) -> bool:
     """Whether a file is a take with frames that have no pose, as far as its beginning shows."""
     poses = _first_poses(path)
     return poses is not None and poses.open and not poses.predicted
+
+
+def beside_recording(source: Source) -> Beside:
+    """What `write_take` is to write beside a result: its source as it was recorded."""
+    return {f"/recorded/{source.kind}": source.values, "/recorded/names": source.names}
+
+
+def with_recording(take: Take, path: Path) -> Take:
+    """A take that was read from a file, with its source as recorded where the file keeps that.
+
+    Raises `InputError` when it is damaged, or of other frames.
+    """
+    if path.suffix.lower() not in OWN_ENDINGS or stated_format(path) != TAKE_FORMAT:
+        return take
+    with open_guarded(path) as file:
+        if "/recorded/names" not in file:
+            return take
+        source = _read_source(file, "/recorded")
+        fix = "Retarget the recording again."
+        require_shape(source.values.shape[:1], (len(take),), f"/recorded/{source.kind}", fix)
+        return replace(take, source=source)
 
 
 def holds_corrections(path: Path) -> bool:
@@ -162,20 +186,20 @@ def write_take(
                 file.array(where, values)
 
 
-def _read_source(file: GuardedFile) -> Source:
-    kinds = [kind for kind in ("markers", "weights") if f"/source/{kind}" in file]
+def _read_source(file: GuardedFile, root: str = "/source") -> Source:
+    kinds = [kind for kind in ("markers", "weights") if f"{root}/{kind}" in file]
     if len(kinds) != 1:
-        expected, found = "either /source/markers or /source/weights", " and ".join(kinds)
-        raise InputError("/source", expected, found or "none of them", "Write one of the two.")
-    path = f"/source/{kinds[0]}"
+        expected, found = f"either {root}/markers or {root}/weights", " and ".join(kinds)
+        raise InputError(root, expected, found or "none of them", "Write one of the two.")
+    path = f"{root}/{kinds[0]}"
     values = file.numbers(path)
     layout = ("T", "M", "3") if kinds[0] == "markers" else ("T", "D")
     require_shape(values.shape, layout, path, "Write one row a frame.")
-    if "/source/valid" in file:  # False: not observed
-        valid, fix = file.flags("/source/valid"), "Give one flag a frame and marker or weight."
-        require_shape(valid.shape, values.shape[:2], "/source/valid", fix)
+    if f"{root}/valid" in file:  # False: not observed
+        valid, fix = file.flags(f"{root}/valid"), "Give one flag a frame and marker or weight."
+        require_shape(valid.shape, values.shape[:2], f"{root}/valid", fix)
         values[~valid] = np.nan
-    return Source(values, file.names("/source/names"))
+    return Source(values, file.names(f"{root}/names"))
 
 
 def _read_controls(file: GuardedFile) -> Controls | None:

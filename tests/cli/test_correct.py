@@ -1,6 +1,7 @@
 import shutil
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -130,7 +131,7 @@ def test_whole_poses_come_from_a_table(facert, shot, tmp_path):
         (("--frame", 3, "--only", "--set", "jawOpen=3.5"), 3, "expected a value from -3 to 3"),
         (("--frame", 3, "--set", "jawOpen=nan"), 3, "jawOpen: expected a number, found nan"),
         (("--frame", 3, "--set", "jawOpen"), 2, "write it as in --set jawOpen=0.3"),
-        (("--frame", 3, "--set", "jawOpen=0.1", "--hold", "mout"), 3, "hold: expected controls"),
+        (("--frame", 3, "--set", "jawOpen=0.1", "--hold", "mout"), 3, "hold: expected a name"),
         (("--frame", 3), 2, "give both --frame and --set"),
         (("--set", "jawOpen=0.1"), 2, "give both --frame and --set"),
         ((), 2, "give --frame with --set NAME=VALUE, or one of"),
@@ -268,16 +269,49 @@ def test_a_pose_of_a_frame_finds_its_frame(facert, shot, take):
         assert posed.params[42, 0] == pytest.approx(0.3)
 
 
-def test_what_was_corrected_is_learned_from_and_nothing_predicted(facert, shot, take):
+def test_what_was_corrected_is_learned_from_as_if_it_were_posed_in_the_recording(
+    facert, shot, take
+):
+    api.write_take(take, "training.h5")
+    assert facert("retarget", "recording.h5", "shot.h5", "--overwrite").code == 0
     corrected(facert, frame=17)
     corrected(facert, frame=33)
-    shot = api.read_take("shot.h5")
     done = facert("convert", "recording.h5", "posed.h5", "--poses", "shot.h5")
     assert done.code == 0, done.err
     assert api.read_take("posed.h5").labels.tolist() == [17, 33]
-    models = [
-        api.train([take, other], api.Settings(method="gpr"))
-        for other in (shot, api.read_take("posed.h5"))
-    ]
+    for other in ("shot", "posed"):
+        asked = ("training.h5", f"{other}.h5", "-o", f"{other}.safetensors", "--method", "gpr")
+        done = facert("train", *asked)
+        assert done.code == 0, done.err
+    models = [api.load(f"{other}.safetensors") for other in ("shot", "posed")]
     assert models[0].labels == models[1].labels == 14
-    assert (models[0].poses == models[1].poses).all()
+    np.testing.assert_allclose(models[0].poses, models[1].poses)
+    np.testing.assert_allclose(models[0].labelled, models[1].labelled)
+
+
+def test_frames_that_are_right_are_confirmed(facert, shot):
+    done = facert("correct", "shot.h5", "--frame", "5,40..41", "--confirm", "--overwrite")
+    assert done.code == 0, done.err
+    made = api.read_take("shot.h5")
+    assert (made.params == shot.params).all()
+    assert made.corrections.frames.tolist() == [5, 40, 41]
+    assert np.isnan(made.std).any(axis=1).sum() == 3
+    failed = facert("correct", "shot.h5", "--frame", 60, "--confirm", "--overwrite")
+    assert failed.code == 3
+    assert "frame: expected 0 to 59, found 60" in failed.err
+    both = facert(
+        "correct", "shot.h5", "--frame", 5, "--confirm", "--set", "jawOpen=0", "-o", "x.h5"
+    )
+    assert both.code == 2
+
+
+def test_a_damaged_recording_in_a_result_is_named(facert, shot):
+    assert facert("retarget", "recording.h5", "shot.h5", "--overwrite").code == 0
+    with h5py.File("shot.h5", "a") as file:
+        values = file["recorded/markers"][:30]
+        del file["recorded/markers"]
+        file["recorded/markers"] = values
+    asked = ("--frame", 3, "--only", "--set", "jawOpen=0.1", "--overwrite")
+    failed = facert("correct", "shot.h5", *asked)
+    assert failed.code == 3
+    assert "shot.h5: /recorded/markers: expected shape (60), found shape (30,)" in failed.err

@@ -96,7 +96,7 @@ def command(
         else:
             given = parse_controls(wanted or [])
             made = _with_set(take, frames, given, width, hold or [], only, model)
-    _write(take, made, output)
+    _write(take, made, path, output)
 
 
 def _require_one(frames: str, ways: int, poses: Path | None, remove: str, show: bool) -> None:
@@ -158,7 +158,7 @@ def _confirmed(take: Take, frames: str) -> Take:
 
     asked = parse_frames(frames, "--frame")
     if take.params is None or asked[-1] >= len(take):
-        return facert.correct(take, dict.fromkeys(asked, {}), only=True)  # it says why not
+        return facert.correct(take, {asked[-1]: {}}, only=True)  # it says why not
     return facert.correct(take, {frame: take.params[frame] for frame in asked})
 
 
@@ -191,11 +191,13 @@ def _without(take: Take, remove: str) -> Take:
     return taken_out(take) if left is None else put_in(take, left)
 
 
-def _write(take: Take, made: Take, output: Path) -> None:
+def _write(take: Take, made: Take, path: Path, output: Path) -> None:
     """Write the result, and a line on each frame that has another pose now."""
-    from facert.io.formats import write_take_file
+    from facert.io.take import beside_recording, with_recording, write_take
 
-    write_take_file(made, output, overwrite=True)
+    recorded = with_recording(take, path).source
+    beside = {} if recorded is take.source else beside_recording(recorded)
+    write_take(made, output, overwrite=True, beside=beside)
     frames = _changed(take, made)
     for frame in frames[:LINES]:
         console.show(f"frame {frame} ({take.time[frame]:.3f} s): {_moves(take, made, frame)}")

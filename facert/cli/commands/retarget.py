@@ -146,6 +146,7 @@ def _retarget(
     from facert.cli.shared.kept_corrections import with_kept
     from facert.data.labelling import without_predicted
     from facert.io.formats import read_source_file
+    from facert.io.take import beside_recording, with_recording
     from facert.io.verdict import beside_result
 
     retargeter = _loaded(model.resolve(), _stamp(model))
@@ -153,11 +154,15 @@ def _retarget(
     began = time.perf_counter()
     chosen = options(retargeter)
     with reading(source):
+        take = with_recording(take, source)
         result = retargeter.retarget(take, mode, chosen, device)
     seconds = time.perf_counter() - began
     made = result if drop else with_kept(result, source, take, output)
     verdict = facert.judge(take, made, retargeter, chosen)
-    write_beside(made, output, overwrite, beside_result(verdict))
+    beside = dict(beside_result(verdict))
+    if output.suffix.lower() in OWN_ENDINGS and chosen.neutral is None:
+        beside |= beside_recording(take.source)  # a calibrated one is of no other use
+    write_beside(made, output, overwrite, beside)
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.show(f"wrote {output}")

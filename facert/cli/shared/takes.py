@@ -43,9 +43,13 @@ def read_takes(
     from facert.data.matching_takes import as_takes
     from facert.io.animation import read_animation
     from facert.io.formats import read_take_file, targets_for
+    from facert.io.take import with_recording
 
     keys = targets_for(target, *paths, *animation)
-    takes = [read_take_file(path, target=key) for path, key in zip(paths, keys, strict=False)]
+    takes = [
+        with_recording(read_take_file(path, target=key), path)
+        for path, key in zip(paths, keys, strict=False)
+    ]
     if predicted:
         takes = [replace(take, std=None, corrections=None) for take in takes]
     old = zip(animation, keys[len(paths) :], strict=True)
