@@ -63,6 +63,11 @@ def read_poses(
         return replace(poses, where=str(path))
 
 
+def numbers_frames(path: Path) -> bool:
+    """Whether a file is a table with a column of frame numbers."""
+    return _numbered_table(path) is not None
+
+
 def _has_column_of_times(path: Path) -> bool:
     """Whether the first pose's time in a file is not where a recording begins."""
     ending = path.suffix.lower()

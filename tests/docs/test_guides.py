@@ -68,7 +68,8 @@ def test_the_readme_works_as_printed_with_a_phones_recordings(tmp_path: Path) ->
 @pytest.mark.slow
 def test_own_data_works_as_printed(tmp_path: Path) -> None:
     rows = [f"{frame / 30},{frame / 100},{frame % 7}" for frame in range(100)]
-    (tmp_path / "recording.csv").write_text("\n".join(["time,eyeBlinkLeft,jawOpen", *rows]))
+    for name in ("recording.csv", "second.csv"):
+        (tmp_path / name).write_text("\n".join(["time,eyeBlinkLeft,jawOpen", *rows]))
     follow(DOCS / "your-data.md", tmp_path)
     made = {path.name for path in tmp_path.iterdir()}
     assert {"take.h5", "result.csv", "curves.png", "posed.h5", "python.h5"} <= made

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facert.preprocess.cache import keep_last
+from facert.preprocess.cache import KEPT, keep_last
 from facert.preprocess.faults import find_faults
 from facert.preprocess.motion.estimate import estimate
 
@@ -32,6 +32,27 @@ def test_other_contents_are_worked_out_anew(counted):
     assert total(values) == 8.0
     assert total(values, scale=2.0) == 16.0
     assert len(calls) == 3
+
+
+def test_a_few_takes_that_are_learned_from_in_turn_are_worked_out_once(counted):
+    total, calls = counted
+    for _ in range(3):
+        for size in range(1, KEPT + 1):
+            assert total(np.ones(size)) == size
+    assert len(calls) == KEPT
+    total(np.ones(KEPT + 1))
+    total(np.ones(2))
+    assert len(calls) == KEPT + 1
+    total(np.ones(1))  # what was not asked for the longest is forgotten
+    assert len(calls) == KEPT + 2
+
+
+def test_large_takes_are_not_kept_beside_each_other(counted, monkeypatch):
+    total, calls = counted
+    monkeypatch.setattr("facert.preprocess.cache.MOST_BYTES", 100)
+    for _ in range(2):
+        total(np.ones(20)), total(np.ones(20)), total(np.ones(10))
+    assert len(calls) == 4
 
 
 def test_an_error_is_not_kept():
