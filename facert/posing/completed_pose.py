@@ -58,7 +58,8 @@ class CompletedPose:
     @property
     def as_dict(self) -> dict[str, Any]:
         """The fields by name, as plain values."""
-        return {
+        when = {} if self.corrected is None else {"time": float(self.corrected.time[0])}
+        return when | {
             "given": dict(self.given),
             "held": list(self.held),
             "pose": self._named(self.pose),
@@ -246,4 +247,6 @@ def _start(take: Take, controls: Controls) -> tuple[FloatArray, FloatArray | Non
     if take.controls is None or take.params is None or len(take.params) != 1:
         raise InputError("start", "one frame with a pose", f"{len(take)} frames", "Retarget one.")
     columns = match(controls.names, take.controls.names, "start: /target/names")
-    return take.params[0, columns], None if take.std is None else take.std[0, columns]
+    if take.std is None or np.isnan(take.std).any():  # somebody's pose has none
+        return take.params[0, columns], None
+    return take.params[0, columns], take.std[0, columns]

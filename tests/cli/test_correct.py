@@ -1,5 +1,7 @@
+import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -188,7 +190,7 @@ def corrected(facert, path="shot.h5", frame=20):
 
 def test_corrections_survive_retargeting_anew(facert, shot, take):
     before = corrected(facert)
-    api.train(take, api.Settings(method="ridge")).save("other.safetensors")
+    api.train(take, api.Settings(method="nearest")).save("other.safetensors")
     asked = ("retarget", "recording.h5", "shot.h5", "-m", "other.safetensors", "--overwrite")
     done = facert(*asked)
     assert done.code == 0, done.err
@@ -239,7 +241,7 @@ def test_corrections_of_another_recording_are_not_lost(facert, shot, take, tmp_p
 def test_corrections_of_another_character_are_not_lost(facert, shot, take):
     corrected(facert)
     api.train(
-        replace(take, controls=Controls([*NAMES[:3], "noseSneer"])), api.Settings(method="ridge")
+        replace(take, controls=Controls([*NAMES[:3], "noseSneer"])), api.Settings(method="nearest")
     ).save("other.safetensors")
     asked = ("retarget", "recording.h5", "shot.h5", "-m", "other.safetensors", "--overwrite")
     failed = facert(*asked)
@@ -267,6 +269,19 @@ def test_a_pose_of_a_frame_finds_its_frame(facert, shot, take):
         posed = api.read_take(f"posed-{ending}.h5")
         assert posed.labels.tolist() == [42]
         assert posed.params[42, 0] == pytest.approx(0.3)
+
+
+def test_a_corrected_frame_is_corrected_again(facert, shot):
+    before = corrected(facert)
+    asked = ("pose", "--from", "shot.h5:20", "--set", "browInnerUp=0.1", "-o", "pose.json")
+    assert facert(*asked).code == 0
+    pose = json.loads(Path("pose.json").read_text())
+    assert (pose["frame"], pose["time"]) == (20, pytest.approx(before.time[20]))
+    done = facert("correct", "shot.h5", "--frame", 20, "--set", "browInnerUp=0.1", "--overwrite")
+    assert done.code == 0, done.err
+    made = api.read_take("shot.h5")
+    assert made.params[20, 2] == 0.1
+    np.testing.assert_allclose(made.params[20], list(pose["pose"].values()))
 
 
 def test_what_was_corrected_is_learned_from_as_if_it_were_posed_in_the_recording(

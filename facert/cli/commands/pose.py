@@ -119,7 +119,7 @@ def command(
         )
     console.out.print(_table(done, soft))
     if output is not None:
-        _write(done, output, overwrite)
+        _write(done, output, overwrite, start)
         console.show(f"wrote {output}")
 
 
@@ -139,7 +139,8 @@ def _retargeted(start: str, retargeter: Retargeter, target: str | None) -> Take:
         raise InputError("--from", expected, number, "Choose another.", where=path)
     one = _frame(take, frame)
     known = () if take.controls is None else take.controls.names
-    if one.std is not None and are_same(known, retargeter.controls.names):
+    is_result = one.std is not None or take.corrections is not None
+    if is_result and are_same(known, retargeter.controls.names):
         return one
     with reading(path):
         return retargeter.retarget(replace(one, params=None, std=None))
@@ -149,9 +150,12 @@ def _frame(take: Take, frame: int) -> Take:
     """One frame of a take; what has a standard deviation was retargeted already."""
     from dataclasses import replace
 
+    from facert.data.corrections import taken_out
+
     source = replace(take.source, values=take.source.values[[frame]])
     params = None if take.params is None else take.params[[frame]]
-    std = None if take.std is None or frame not in take.labels else take.std[[frame]]
+    std = taken_out(take).std
+    std = None if std is None or frame not in take.labels else std[[frame]]
     return replace(
         take,
         time=take.time[[frame]],
@@ -200,11 +204,12 @@ def _mark(done: CompletedPose, name: str, soft: float) -> str:
     return "held" if name in done.held else ""
 
 
-def _write(done: CompletedPose, output: Path, overwrite: bool) -> None:
-    """Write a take with a pose a frame, or JSON."""
+def _write(done: CompletedPose, output: Path, overwrite: bool, start: str) -> None:
+    """Write a take with a pose a frame, or JSON; of a corrected frame with its number and time."""
     from facert.io.formats import write_take_file
 
     if output.suffix.lower() == ".json":
-        save_json({"created_by": CREATED_BY, **done.as_dict}, output, overwrite)
+        frame = {"frame": int(start.rpartition(":")[2])} if start else {}
+        save_json({"created_by": CREATED_BY, **frame, **done.as_dict}, output, overwrite)
     else:
         write_take_file(done.as_take, output, overwrite)
