@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from facert.data.regions import AUTO, Regions
+from facert.data.text import did_you_mean
 from facert.errors import InputError
 
 OptimiserName = Literal["lbfgs", "scg"]
@@ -208,7 +209,8 @@ def _check_type(name: str, value: object, hint: Any) -> None:
     words = choices(hint)
     if words:
         if value not in words:
-            raise _bad(name, "one of " + ", ".join(words), value)
+            fix = did_you_mean(str(value), words, "Change the setting.")
+            raise InputError(name, "one of " + ", ".join(words), repr(value), fix)
         return
     allowed = get_args(hint) or (hint,)
     if float in allowed:

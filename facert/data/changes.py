@@ -139,7 +139,7 @@ def renamed(found: Take | Rig, names: Mapping[str, object]) -> Take | Rig:
     for theirs, ours in names.items():
         if not isinstance(ours, str):
             expected = 'a name, as in theirs = "ours"'
-            raise InputError(theirs, expected, repr(ours), "Correct the map.")
+            raise InputError(f"--map: {theirs}", expected, repr(ours), "Correct the map.")
     new = {theirs: str(ours) for theirs, ours in names.items()}
     if isinstance(found, Rig):
         (shapes,) = _renamed([found.names], new)

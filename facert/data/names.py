@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import logging
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -54,6 +55,8 @@ ARKIT_ANGLES = tuple(_ANGLES.split())
 """The nine angles that follow them, in radians."""
 
 ARKIT_NAMES = ARKIT_SHAPES + ARKIT_ANGLES
+
+_FIRST_WORD = re.compile(r"[A-Za-z][a-z]+")
 
 _ARKIT_SPELLING = {folded(name): name for name in ARKIT_NAMES}
 
@@ -259,7 +262,7 @@ def fitting_some(pattern: str, names: Sequence[str], field: str) -> list[int]:
     if not found:
         meant = instead_of(pattern, names)
         fix = f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
-        raise InputError(field, "a name, or a pattern that some fit", repr(pattern), fix)
+        raise InputError(field, "controls, or a pattern that some fit", repr(pattern), fix)
     return found
 
 
@@ -268,6 +271,8 @@ def instead_of(name: str, among: Sequence[str]) -> str | None:
 
     >>> instead_of("smile", ["smile_L", "smile_R"]), instead_of("smille_L", ["smile_L", "smile_R"])
     ("'smile*' for both sides", "'smile_L'")
+    >>> instead_of("mouht*", ["mouthOpen", "mouthSmile_L", "jawOpen"])
+    "'mouth*'"
     """
     sides = [one for one in among if _without_side(one) == words(name)]
     if len(sides) > 1:
@@ -276,7 +281,14 @@ def instead_of(name: str, among: Sequence[str]) -> str | None:
             return f"{pattern!r} for both sides"
         return " and ".join(map(repr, sides))
     near = nearest(name, among)
-    return None if near is None else repr(near)
+    return _pattern_instead(name, among) if near is None else repr(near)
+
+
+def _pattern_instead(pattern: str, among: Sequence[str]) -> str | None:
+    """The pattern of some names whose first word is spelled nearly as that of a pattern."""
+    first = [word[0] for word in map(_FIRST_WORD.match, among) if word]
+    near = difflib.get_close_matches(pattern.rstrip("*"), first, n=1, cutoff=0.7)
+    return repr(f"{near[0]}*") if near and pattern.endswith("*") else None
 
 
 def _without_side(name: str) -> tuple[str, ...]:

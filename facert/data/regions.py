@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
+from facert.data.text import did_you_mean
 from facert.errors import InputError
 
 AUTO = "auto"
@@ -132,8 +133,8 @@ def _region(name: str, table: Any) -> Region:
         raise InputError("regions", "a table a region", found, "Write [brows], markers, controls.")
     unknown = [key for key in table if key not in _KEYS]
     if unknown:
-        known = " and ".join(_KEYS)
-        raise InputError(f"regions.{name}", known, repr(unknown[0]), "Remove or rename it.")
+        known, fix = " and ".join(_KEYS), did_you_mean(unknown[0], _KEYS, "Remove or rename it.")
+        raise InputError(f"regions.{name}", known, repr(unknown[0]), fix)
     return Region(name, *(_names(table.get(key, ()), f"regions.{name}.{key}") for key in _KEYS))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 
 from facert.errors import escaped
 
@@ -19,6 +20,16 @@ def plural(count: int, noun: str, nouns: str = "") -> str:
 def printable(text: str, most: int = 60) -> str:
     """Foreign text for a line of the log: short, with escapes for what would upset a terminal."""
     return escaped(text if len(text) <= most else f"{text[:most]}[...]")
+
+
+def did_you_mean(name: str, among: Iterable[str], otherwise: str = "Choose one of these.") -> str:
+    """The fix for a word that is none of some: the one that is spelled most like it.
+
+    >>> did_you_mean("ssgrp", ["ssgpr", "ridge"]), did_you_mean("x", ["ssgpr"], "Remove it.")
+    ("Did you mean 'ssgpr'?", 'Remove it.')
+    """
+    near = difflib.get_close_matches(name, list(among), n=1)
+    return f"Did you mean {near[0]!r}?" if near else otherwise
 
 
 def listed(names: Sequence[str], most: int = 5) -> str:

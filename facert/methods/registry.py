@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
+from facert.data.text import did_you_mean
 from facert.errors import InputError
 from facert.settings import Settings
 
@@ -38,7 +39,7 @@ def method_class(name: str) -> type[Method]:
     """
     if name not in REGISTRY:
         raise InputError(
-            "method", "one of " + ", ".join(REGISTRY), repr(name), "Choose one of these."
+            "method", "one of " + ", ".join(REGISTRY), repr(name), did_you_mean(name, REGISTRY)
         )
     module, class_name = REGISTRY[name]
     found: type[Method] = getattr(importlib.import_module(f"facert.methods.{module}"), class_name)

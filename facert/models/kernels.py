@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.text import did_you_mean
 from facert.errors import InputError
 
 if TYPE_CHECKING:  # importing it takes seconds, and most methods do without
@@ -177,7 +178,7 @@ def kernel_class(name: str, field: str) -> type[Kernel]:
     """The kernel of that name; raises InputError, which names the field, when there is none."""
     if name not in KERNELS:
         expected = "one of " + ", ".join(KERNELS)
-        raise InputError(field, expected, repr(name), "Choose one of these.")
+        raise InputError(field, expected, repr(name), did_you_mean(name, KERNELS))
     return KERNELS[name]
 
 

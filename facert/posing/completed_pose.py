@@ -199,7 +199,7 @@ def given_controls(controls: Controls, wanted: Mapping[str, float], soft: float 
     for name in wanted:
         if index.find(name) is None:
             fix = _did_you_mean(name, controls.names)
-            raise InputError("given controls", "names of controls", repr(name), fix)
+            raise InputError("--set", "the name of a control", repr(name), fix)
     positions = index.places(list(wanted), "given controls")
     values = np.array(list(wanted.values()), dtype=np.float64)
     for name, position, value in zip(wanted, positions, values, strict=True):
@@ -218,7 +218,7 @@ def _held(names: tuple[str, ...], patterns: Sequence[str], given: Given) -> IntA
     """The controls that fit a pattern and are not given, rising."""
     found: set[int] = set()
     for pattern in patterns:
-        found.update(fitting_some(pattern, names, "hold"))
+        found.update(fitting_some(pattern, names, "--hold"))
     return np.setdiff1d(np.array(sorted(found), dtype=np.int64), given.controls)
 
 

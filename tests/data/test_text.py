@@ -2,7 +2,7 @@
 
 import pytest
 
-from facert.data.text import plural
+from facert.data.text import did_you_mean, plural
 
 
 @pytest.mark.parametrize(
@@ -11,3 +11,8 @@ from facert.data.text import plural
 def test_one_is_singular_and_all_others_are_plural(count: int, text: str) -> None:
     assert plural(count, "vertex", "vertices") == text
     assert plural(count, "frame") == f"{count} frame{'' if count == 1 else 's'}"
+
+
+def test_a_slip_of_the_pen_is_answered_with_the_word() -> None:
+    assert did_you_mean("ssgrp", ("ssgpr", "ridge")) == "Did you mean 'ssgpr'?"
+    assert did_you_mean("forest", ("ssgpr", "ridge")) == "Choose one of these."

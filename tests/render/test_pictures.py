@@ -164,7 +164,7 @@ def test_truth_band_and_key_poses_are_drawn() -> None:
 
 def test_a_control_that_is_not_there_is_named() -> None:
     with pytest.raises(
-        InputError, match="--controls: expected a name, or a pattern that some fit, found 'smile'"
+        InputError, match="--controls: expected controls, or a pattern that some fit, found 'smile'"
     ):
         plot_controls(TAKE, names=["smile"])
 

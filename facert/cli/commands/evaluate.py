@@ -25,7 +25,7 @@ from facert.cli.shared.options import (
 )
 from facert.cli.shared.takes import BUILT_IN, listed_files, short_names
 from facert.data.ranges import parse_range
-from facert.data.text import plural
+from facert.data.text import did_you_mean, plural
 from facert.errors import InputError, reading
 from facert.methods.registry import REGISTRY
 
@@ -205,7 +205,8 @@ def _methods(text: str) -> tuple[str, ...]:
     unknown = [name for name in names if name not in REGISTRY]
     if unknown:
         expected = "all, or some of " + ", ".join(REGISTRY)
-        raise InputError("--methods", expected, repr(unknown[0]), "Choose others.", "the options")
+        fix = did_you_mean(unknown[0], REGISTRY, "Choose others.")
+        raise InputError("--methods", expected, repr(unknown[0]), fix)
     return names
 
 

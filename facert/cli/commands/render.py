@@ -214,4 +214,5 @@ def _parse(frames: str) -> list[int] | range | None:
             return range(first, last + 1)
         return [int(frame) for frame in frames.split(",")]
     except ValueError:
-        raise typer.BadParameter("give numbers as in 0,30,60, or a part as in 100..400") from None
+        text = f"{frames!r}: give numbers as in 0,30,60, or a part as in 100..400"
+        raise typer.BadParameter(text, param_hint="--frames") from None

@@ -163,11 +163,13 @@ def command(
 def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, Any]) -> Settings:
     """Settings of the model to begin at, of the config file, then of the options given."""
     from facert.io.toml import read_toml
+    from facert.methods.registry import require_known
 
     settings = DEFAULTS if begin is None else replace(begin.settings, labels=None)
     if config is not None:
         with reading(config):
             settings = settings.with_changes(read_toml(config, "latent_dim = 8"))
+            require_known(settings)
     given = {name: value for name, value in options.items() if value is not None}
     if "neutral" in given:
         given["neutral"] = "; ".join(given["neutral"])
