@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from facert.data.arrays import FloatArray
 from facert.pages.pose_editor import Edit
+from facert.pages.posed_take import Label
 
 PAUSE = 1.0
 """Seconds: changes of one kind that follow each other faster are one, as of a slider dragged."""
@@ -18,10 +18,16 @@ MOST = 500
 class FrameState:
     """A frame as it is being posed."""
 
+    take: int
     frame: int
     edit: Edit
-    saved: FloatArray | None
-    """The pose that was saved for it, (P,), if there is one."""
+    saved: Label | None
+    """What was saved for it, if anything."""
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Which take, and which frame of it."""
+        return self.take, self.frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +60,7 @@ class History:
         """Remember a change; one of the same kind in the same frame just before becomes one."""
         now = self._clock()
         same = self._done and kind == self._kind and now - self._last < PAUSE
-        if same and self._done[-1].after.frame == change.before.frame:
+        if same and self._done[-1].after.place == change.before.place:
             change = replace(change, before=self._done.pop().before)
         self._done = [*self._done, change][-MOST:]
         self._undone.clear()

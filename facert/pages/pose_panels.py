@@ -1,4 +1,4 @@
-"""The panels of the page to pose on: sliders, the bar with Save, what is pinned, and learning."""
+"""The panels of the page to pose on: sliders, the bar with Save, and what is pinned."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ from typing import TYPE_CHECKING, Protocol
 
 from viser import Icon
 
+from facert.data.corrections import WIDTH
 from facert.pages.pose_editor import PoseEditor, slider_bounds
 from facert.pages.pose_stage import SAMPLES
+from facert.pages.posed_take import Label
 from facert.pages.widgets import ButtonList, Sliders, Text
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import GuiEvent, GuiSliderHandle, ViserServer
 
 LEFT, BAR, EDGE = 330, 590, 15  # pixels: width of the sliders and of the bar, and air around it
-TRAIN, TRAINING = "Train on the labels", "Training ..."
+WIDEST = 3.0  # seconds
+BLENDING = "Half of it before the frame, half after it"
 BEFORE, NEAREST, AFTER = "◂ key", "nearest", "key ▸"
 
 
 class PoseActions(Protocol):
-    """What a person can ask for, as `facert.pages.pose_page.PosePage` does it."""
+    """What a person can ask for, as `facert.pages.pose_editing.PoseEditing` does it."""
 
     editor: PoseEditor
 
@@ -53,8 +56,11 @@ class PoseActions(Protocol):
     def redo(self) -> None:
         """Make it anew."""
 
-    def train(self) -> None:
-        """Train on what is saved."""
+    def take_back(self) -> None:
+        """Leave the frame without its label."""
+
+    def widen(self, seconds: float) -> None:
+        """Blend the pose of the frame over so many seconds."""
 
     def sample(self) -> None:
         """Show other plausible poses."""
@@ -120,11 +126,21 @@ class PosePanel:
         self.adopt = gui.add_button_group(
             "take over", tuple(f"other {number}" for number in range(1, SAMPLES + 1)), visible=False
         )
+        self._width = gui.add_slider(
+            "blend over (s)", 0.0, WIDEST, 0.05, WIDTH, visible=False, hint=BLENDING
+        )
+        self._back = gui.add_button("Take this frame's pose back", icon=Icon.ERASER, color="gray")
         self._other_side.on_click(lambda _: page.pin_counterpart())
         self._free.on_click(lambda _: page.let_all_go())
+        self._back.on_click(lambda _: page.take_back())
         neutral.on_click(lambda _: page.start_from_neutral())
         other.on_click(lambda _: page.sample())
         self.adopt.on_click(lambda event: page.adopt(int(event.target.value.split()[-1]) - 1))
+
+        @self._width.on_update
+        def _(event: GuiEvent[GuiSliderHandle[float]]) -> None:
+            if event.client is not None:  # a person, and not the page itself
+                page.widen(float(self._width.value))
 
     def show(self) -> None:
         """Show what is pinned."""
@@ -138,27 +154,8 @@ class PosePanel:
             other = names[editor.counterparts[one_sided]]
             self._other_side.label = f"{other} as {names[one_sided]}"
 
-
-class LearningPanel:
-    """Training, and its outcome.
-
-    Parameters
-    ----------
-    server : ViserServer
-    page : PoseActions
-    there : bool
-        Whether there is a take to learn from.
-    """
-
-    def __init__(self, server: ViserServer, page: PoseActions, there: bool) -> None:
-        self._train = server.gui.add_button(TRAIN, icon=Icon.SCHOOL, visible=there)
-        self._train.on_click(lambda _: page.train())
-        self.outcome = Text(server)
-
-    def show_labels(self, count: int) -> None:
-        """Show how many labels there are to learn from."""
-        self._train.hint = f"{count} labels"
-
-    def show_training(self, under_way: bool) -> None:
-        """Show whether a model is being trained."""
-        self._train.disabled, self._train.label = under_way, TRAINING if under_way else TRAIN
+    def show_label(self, blends: bool, width: float, label: Label | None) -> None:
+        """Show the frame's label, if it has one, and whether and how long it is blended."""
+        self._width.visible, self._back.visible = blends, label is not None
+        if blends and abs(self._width.value - width) > self._width.step / 2:
+            self._width.value = min(width, WIDEST)  # type: ignore[misc]

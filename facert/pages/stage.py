@@ -49,14 +49,18 @@ class Part:
     """
 
     def __init__(self, server: ViserServer, label: str, points: FloatArray) -> None:
-        camera = frame_mesh(points)
         self._server = server
-        self._centre, self._scale = np.array(camera.centre), 0.5 / max(camera.reach, 1e-9)
-        self.width = float(np.ptp(points[:, 0])) * self._scale
+        self._fit(points)
         self.root = server.scene.add_frame(f"/{label}", show_axes=False)
         server.scene.add_label(
             f"/{label}/label", label, position=(0.0, -0.56, 0.0), anchor="top-center"
         )
+
+    def _fit(self, points: FloatArray) -> None:
+        """Scale it to points (n, 3)."""
+        camera = frame_mesh(points)
+        self._centre, self._scale = np.array(camera.centre), 0.5 / max(camera.reach, 1e-9)
+        self.width = float(np.ptp(points[:, 0])) * self._scale
 
     def _placed(self, points: FloatArray) -> FloatArray:
         return np.asarray((points - self._centre) * self._scale)
@@ -180,6 +184,10 @@ class MarkerPart(Part):
         )
         self.draw(markers[0])
 
+    def turn_to(self, markers: FloatArray) -> None:
+        """Show those of another take, (T, M, 3)."""
+        self._fit(markers[~np.isnan(markers).any(axis=2)])
+
     def draw(self, markers: FloatArray) -> None:
         """Markers (M, 3); those that are NaN are left out."""
         there = self._placed(markers[~np.isnan(markers).any(axis=1)])
@@ -286,6 +294,12 @@ class ActorParts:
         self._mesh: FacePart | None = None
         if face is not None:
             self._mesh = stage.add(face_part(server, face))
+
+    def turn_to(self, source: Source, face: Face | None) -> None:
+        """Show another recording of the same actor."""
+        self._source, self._face = source, face
+        if self._markers is not None:
+            self._markers.turn_to(source.values)
 
     def draw(self, frame: int) -> None:
         """Show a frame."""

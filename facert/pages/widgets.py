@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 from viser import Icon, IconName
@@ -13,7 +13,7 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import control_groups
 from facert.data.take import Take
 from facert.data.timecode import timecode
-from facert.pages.worker import PlayedPage
+from facert.pages.worker import Playback
 
 if TYPE_CHECKING:
     from viser import GuiButtonHandle, GuiEvent, GuiSliderHandle, ViserServer
@@ -91,7 +91,10 @@ class Sliders:
         return handle
 
 
-class ButtonList:
+Key = TypeVar("Key")
+
+
+class ButtonList(Generic[Key]):
     """A folder of buttons, hidden while it is empty.
 
     Buttons stay once they are made, and are hidden and named anew: viser stumbles over one that is
@@ -111,15 +114,15 @@ class ButtonList:
         self,
         server: ViserServer,
         title: str,
-        clicked: Callable[[int], None],
+        clicked: Callable[[Key], None],
         icon: IconName | None = None,
     ) -> None:
         self._server, self._clicked, self._icon = server, clicked, icon
         self._folder = server.gui.add_folder(title, visible=False)
         self._buttons: list[GuiButtonHandle] = []
-        self._keys: list[int] = []
+        self._keys: list[Key] = []
 
-    def show(self, labels: Mapping[int, str]) -> None:
+    def show(self, labels: Mapping[Key, str]) -> None:
         """List buttons with these labels by their keys, in this order."""
         while len(self._buttons) < len(labels):
             self._buttons.append(self._add(len(self._buttons)))
@@ -160,6 +163,21 @@ class Text:
         self._html.content = f'<div style="padding:4px 12px;font-size:13px">{lines}</div>'
 
 
+class PlayControls(Protocol):
+    """What a person can ask for, as `facert.pages.worker.PlayedPage` does it."""
+
+    playback: Playback
+
+    def seek(self, frame: int) -> None:
+        """Go to a frame."""
+
+    def step(self, frames: int) -> None:
+        """Go so many frames on, or back."""
+
+    def toggle(self) -> None:
+        """Play, or pause."""
+
+
 class Timeline:
     """A slider over the frames, buttons beside it, and what moment it is.
 
@@ -167,11 +185,11 @@ class Timeline:
     ----------
     server : ViserServer
     take : Take
-    page : PlayedPage
+    page : PlayControls
         Shows the take's frames.
     """
 
-    def __init__(self, server: ViserServer, take: Take, page: PlayedPage) -> None:
+    def __init__(self, server: ViserServer, take: Take, page: PlayControls) -> None:
         self._server, self._take, self._page = server, take, page
         self._key_poses: list[int] = []
         self._moment = server.gui.add_html("")
@@ -183,6 +201,12 @@ class Timeline:
         steps = server.gui.add_button_group("", ("◂ key", "◂", "▸", "key ▸"))
         self._play.on_click(lambda _: page.toggle())
         steps.on_click(lambda event: self._step(str(event.target.value)))
+
+    def turn_to(self, take: Take) -> None:
+        """Show another take from its first frame on."""
+        self._take = take
+        self._slider.value = 0  # type: ignore[misc]
+        self._slider.max = max(len(take) - 1, 1)
 
     def mark(self, key_poses: IntArray) -> None:
         """Show where the key poses are."""

@@ -193,7 +193,7 @@ def test_keys_are_the_pages_after_a_click_and_do_not_turn_the_camera(pose_page) 
         seen.page.keyboard.press("ArrowRight")
     seen.page.keyboard.press("ArrowLeft")
     assert seen.until(lambda: page.playback.frame == 2)
-    assert page.unsaved == [0]
+    assert page.unsaved == [(0, 0)]
     seen.page.get_by_role("button", name="Play").click()
     assert seen.until(lambda: page.playback.playing)
     seen.page.keyboard.press(" ")

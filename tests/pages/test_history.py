@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 from facert.pages.history import PAUSE, Change, FrameState, History
@@ -23,7 +22,7 @@ def history(clock) -> History:
 
 
 def state(frame: int, value: float) -> FrameState:
-    return FrameState(frame, Edit({0: value}, None, None, False), np.full(1, value))
+    return FrameState(0, frame, Edit({0: value}, None, None, False), None)
 
 
 def move(history: History, frame: int, old: float, new: float, kind: object = "pin") -> Change:

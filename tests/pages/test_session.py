@@ -39,17 +39,17 @@ def test_a_saved_pose_is_a_label_here_and_in_the_file(session) -> None:
 def test_a_pose_is_taken_back_here_and_in_the_file(session) -> None:
     before, frame = session.take.labels, free_frame(session)
     session.save(frame, np.zeros(4))
-    assert session.saved_pose(frame).tolist() == [0.0] * 4
+    assert session.label(frame).pose.tolist() == [0.0] * 4
     session.put(frame, None)
-    assert session.saved_pose(frame) is None
+    assert session.label(frame) is None
     assert session.saved == 0
     np.testing.assert_array_equal(facert.read_take(session.output).labels, before)
 
 
-def test_a_label_counts_only_once_it_is_written(session, tmp_path) -> None:
-    blocked = tmp_path / "file"
+def test_a_label_counts_only_once_it_is_written(make_take, tmp_path) -> None:
+    blocked, take = tmp_path / "file", make_take(animation=0)
     blocked.write_text("no folder")
-    session.output = blocked / "take.posed.h5"
+    session = PosingSession(take.controls, take, output=blocked / "take.posed.h5")
     frame = free_frame(session)
     with pytest.raises(InputError, match="output"):
         session.save(frame, np.zeros(4))
@@ -143,5 +143,77 @@ def test_controls_come_from_the_model_the_take_or_the_rig(make_take) -> None:
     ("take", "output"),
     [("a/take.h5", "a/take.posed.h5"), ("take.csv", "take.posed.h5"), ("t.posed.h5", "t.posed.h5")],
 )
-def test_labels_go_beside_the_take(take: str, output: str) -> None:
-    assert output_beside(Path(take)) == Path(output)
+def test_labels_go_beside_the_take(take: str, output: str, make_take) -> None:
+    assert output_beside(Path(take), make_take()) == Path(output)
+
+
+@pytest.fixture(scope="module")
+def model(make_take):
+    return facert.train(make_take(), facert.Settings(method="gpr"))
+
+
+@pytest.fixture
+def corrected(make_take, model, tmp_path) -> PosingSession:
+    """A session on what retarget wrote."""
+    result = model.retarget(make_take(posed=0, animation=0))
+    path = tmp_path / "result.h5"
+    assert output_beside(path, result) == path
+    return PosingSession(model.controls, result, output=path, names=["result.h5"])
+
+
+def test_a_changed_frame_of_a_result_is_a_correction_blended_and_taken_back(corrected) -> None:
+    before = corrected.result.params
+    pose = before[20] + 0.2
+    corrected.save(20, pose, width=0.4)
+    written = facert.read_take(corrected.output)
+    assert written.corrections.frames.tolist() == [20]
+    np.testing.assert_allclose(written.params[20], pose)
+    moved = np.abs(written.params - before).max(axis=1)
+    assert 0 < moved[21] < moved[20]
+    assert moved[30] == 0
+    np.testing.assert_array_equal(corrected.pose(21)[0], written.params[21])
+    again = PosingSession(corrected.controls, written, output=corrected.output)
+    assert again.label(20).width == 0.4
+    np.testing.assert_array_equal(again.result.params, before)
+    again.put(20, None)
+    bare = facert.read_take(corrected.output)
+    assert bare.corrections is None
+    np.testing.assert_array_equal(bare.params, before)
+
+
+def test_corrections_alone_are_not_learned_from(corrected) -> None:
+    corrected.save(20, np.zeros(4))
+    with pytest.raises(InputError, match="a take that was posed"):
+        corrected.train()
+
+
+def test_takes_are_learned_from_together_and_each_is_saved_beside_itself(
+    make_take, model, tmp_path
+) -> None:
+    posed, other = make_take(animation=0), make_take(seed=5, posed=0, animation=0)
+    paths = [tmp_path / "a.posed.h5", tmp_path / "b.posed.h5"]
+    session = PosingSession(posed.controls, [posed, other], model, paths, ["a", "b"])
+    session.here = 1
+    session.save(3, np.full(4, 0.1))
+    assert [path.exists() for path in paths] == [False, True]
+    assert session.saved_of(1) == session.saved == 1
+    found = session.suggestion(4)
+    assert set(found.takes.tolist()) <= {0, 1}
+    assert (1, 3) not in zip(found.takes.tolist(), found.frames.tolist(), strict=True)
+    trained = session.train()
+    assert trained.labels == 13
+    assert session.model_path == tmp_path / "a.posed.safetensors"
+    assert session.pose(7)[0].shape == (4,)
+    assert session.verdict().level in ("good", "look at it", "bad")
+
+
+def test_a_label_is_blended_into_what_was_predicted(make_take, model, tmp_path) -> None:
+    take = make_take(animation=0)
+    session = PosingSession(take.controls, take, model, tmp_path / "take.posed.h5")
+    frame = free_frame(session)
+    before = session.result.params[frame]
+    session.save(frame, before + 0.3)
+    shown = session.part.shown.params
+    np.testing.assert_allclose(shown[frame], before + 0.3)
+    assert not np.isnan(shown).any()
+    assert facert.read_take(session.output).params[frame].tolist() == (before + 0.3).tolist()

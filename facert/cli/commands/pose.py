@@ -21,6 +21,8 @@ from facert.cli.shared.options import (
     SEED,
     SHAPES,
     TARGET,
+    VIDEO,
+    VIDEO_START,
     file_option,
     option,
 )
@@ -80,8 +82,13 @@ def command(
     ] = False,
     rig: RIG = None,
     drivers: DRIVERS = None,
-    take: Annotated[Path | None, file_option("The recording to pose, for --view.")] = None,
+    take: Annotated[
+        list[Path] | None,
+        option("The recording to pose, or a result to correct, for --view; again for more."),
+    ] = None,
     actor: ACTOR = None,
+    video: VIDEO = None,
+    video_start: VIDEO_START = None,
     shapes: SHAPES = None,
     host: HOST = "127.0.0.1",
     port: PORT = 8080,
@@ -94,7 +101,9 @@ def command(
     if view:
         from facert.cli.shared.pose_view import Files, open_page
 
-        files = Files(rig, drivers, take, model, actor, output, target, shapes)
+        files = Files(
+            rig, drivers, take or [], model, actor, output, target, shapes, video, video_start
+        )
         return open_page(files, overwrite, host, port)
     if not wanted:
         raise typer.BadParameter("give values with --set NAME=VALUE, or --view for sliders")
