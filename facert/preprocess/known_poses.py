@@ -15,7 +15,7 @@ from facert.settings import LimitRule
 MOST = 500
 
 BEYOND = 0.5
-"""So far beyond the known poses, as a share of their range, a limit lets a control go: without this,
+"""A limit lets a control go so far beyond the known poses, as a share of their range: without it,
 errors between recordings were up to 1.24 of those with the range alone."""
 
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.corrections import WIDTH, put_in
 from facert.data.names import NameIndex
-from facert.data.take import Source, Take
+from facert.data.take import Corrections, Source, Take
 from facert.errors import InputError
 from facert.preprocess.known_poses import pose_bounds
 from facert.settings import LimitRule
@@ -52,7 +53,8 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     Returns
     -------
     Take
-        Its poses are clipped to the limits of `how`.
+        Its poses are clipped to the limits of `how`. Those of the key frames are kept as set by
+        somebody, as corrections are; the others count as predicted, and training passes over them.
 
     Raises
     ------
@@ -67,8 +69,10 @@ def propagate_poses(take: Take, keys: Sequence[int], how: Propagation | None = N
     params = how.run(source, chosen, poses[:, None, :])[:, 0]
     bounds = pose_bounds(take, poses, how.limits)
     if bounds is not None:
-        params = np.clip(params, *bounds.T)
-    return replace(take, params=params, std=None, corrections=None)
+        params, poses = (np.clip(values, *bounds.T) for values in (params, poses))
+    result = replace(take, params=params, std=None, corrections=None)
+    frames, first = np.unique(chosen, return_index=True)
+    return put_in(result, Corrections(frames, poses[first], np.full(len(frames), WIDTH)))
 
 
 def propagate_positions(

@@ -6,6 +6,7 @@ import pytest
 
 import facert as api
 from facert.cli.commands import drive, propagate
+from facert.data.labelling import predicted_poses
 from facert.data.take import Source
 from facert.topology import driving, propagation
 from facert.topology.propagated_takes import Propagation, propagate_poses
@@ -112,3 +113,20 @@ def test_help_names_every_method():
         text = Path(module.__file__).read_text(encoding="utf-8").replace('"\n            "', "")
         for name in methods:
             assert name in text
+
+
+def test_propagated_poses_are_no_labels_but_key_poses_are(facert, make_take, tmp_path):
+    take = make_take(posed=9)
+    api.write_take(take, tmp_path / "take.h5")
+    whole = tmp_path / "whole.h5"
+    assert facert("propagate", tmp_path / "take.h5", whole).code == 0
+    result = api.read_take(whole)
+    assert predicted_poses(result) == 51
+    np.testing.assert_array_equal(result.params[take.labels], take.params[take.labels])
+    done = facert("train", whole, "-o", tmp_path / "m.safetensors", "--method", "nearest")
+    assert done.code == 0, done.err
+    assert "51 poses" in done.err
+    assert api.load(tmp_path / "m.safetensors").labels == 9
+    done = facert("convert", tmp_path / "take.h5", tmp_path / "again.h5", "--poses", whole)
+    assert done.code == 0, done.err
+    assert api.read_take(tmp_path / "again.h5").labels.tolist() == sorted(take.labels)
