@@ -63,7 +63,7 @@ class FacertSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
         ),
         "scope": bpy.props.EnumProperty(name="Objects", items=_SCOPES, default="ALL"),
         "fit": bpy.props.BoolProperty(
-            name="Set the scene's rate and range",
+            name="Set rate and range",
             description="To those of the curves; else the curves are keyed by time",
             default=True,
         ),

@@ -13,6 +13,7 @@ from facert.io.importers.shared import (
     Pose,
     ScriptError,
     Timeline,
+    find,
     keys,
     listed_frames,
     plural,
@@ -44,7 +45,7 @@ def timeline_of(scene: Any) -> Timeline:
     kept = scene.get(TIMELINE)
     if kept is None:
         return Timeline(scene_rate(scene))
-    rate, known = json.loads(kept)
+    rate, known, _ = json.loads(kept)
     return Timeline(rate, [(frame, seconds) for frame, seconds in known])
 
 
@@ -68,7 +69,7 @@ def import_curves(
     }
     warnings = key_controls(face, points, anew=True)
     time = [second - curves.time[0] for second in curves.time]
-    _keep(scene, Timeline(curves.fps, list(enumerate(time))))
+    _keep(scene, Timeline(curves.fps, list(enumerate(time))), list(curves.values))
     names = some(face.names, 4)
     at = f"{len(curves.time)} frames at {curves.fps:g} frames/s on {rate:g} frames/s"
     return Report(f"{at}, keyed on {names}", [*face.warnings, *warnings])
@@ -96,10 +97,11 @@ def export_poses(
     poses, outside = _posed(scene, face, frames, start)
     if not poses:
         raise ScriptError(f"all frames are before the recording's first, which is at {start:g}")
+    poses = _without_strangers(scene, poses)
     write_poses(path, poses, timeline_of(scene).rate)
     said = [f"not in the recording, left out: {some(outside)}"] if outside else []
     shown = some([str(pose.frame) for pose in poses])
-    what = f"{plural(len(poses), 'pose')} of {plural(len(face.controls), 'control')}"
+    what = f"{plural(len(poses), 'pose')} of {plural(len(poses[0].values), 'control')}"
     return Report(f"{what}, of frames {shown}", [*face.warnings, *said])
 
 
@@ -168,6 +170,18 @@ def _posed(
     return [poses[number] for number in sorted(poses)], outside
 
 
+def _without_strangers(scene: Any, poses: Sequence[Pose]) -> list[Pose]:
+    """Poses without the controls that the imported curves have not and no pose moves.
+
+    A result that is corrected has those of its model alone.
+    """
+    kept = scene.get(TIMELINE)
+    curves = json.loads(kept)[2] if kept else []
+    moved = {name for pose in poses for name, value in pose.values.items() if abs(value) > 1e-6}
+    names = [n for n in poses[0].values if not curves or n in moved or find(n, curves) is not None]
+    return [pose._replace(values={name: pose.values[name] for name in names}) for pose in poses]
+
+
 def _marked(scene: Any, selected: bool) -> list[float]:
     markers = [m for m in scene.timeline_markers if m.select or not selected]
     return sorted({float(marker.frame) for marker in markers})
@@ -185,9 +199,9 @@ def _mark(scene: Any, frame: int | None, place: float) -> None:
         scene.timeline_markers.new(f"{MARKER}{frame}", frame=place)
 
 
-def _keep(scene: Any, line: Timeline) -> None:
+def _keep(scene: Any, line: Timeline, controls: Sequence[str] = ()) -> None:
     known = [(frame, round(seconds, 6)) for frame, seconds in line.known]
-    scene[TIMELINE] = json.dumps([line.rate, known])
+    scene[TIMELINE] = json.dumps([line.rate, known, list(controls)])
 
 
 def _usual_rate(known: Sequence[tuple[int, float]], otherwise: float) -> float:
