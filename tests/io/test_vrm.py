@@ -12,6 +12,8 @@ from gltf_files import Builder
 
 from facert.errors import InputError
 from facert.io.formats import read_mesh, read_rig_file, read_take_file
+from facert.io.gltf.character import Character
+from facert.io.gltf.document import open_gltf
 from facert.io.gltf.rig import read_gltf_rig
 
 TRIANGLE = np.eye(3, dtype=np.float32)
@@ -181,3 +183,29 @@ def test_expressions_of_one_name_are_numbered(tmp_path: Path) -> None:
     rig = read_rig_file(path, "expressions")
     assert rig.names == ("a", "a_2", "a_2_2", "a_3")
     np.testing.assert_allclose(rig.shapes[1], [[0, 0, 2]] * 3 + [[0, 0, 0]] * 3)
+
+
+@pytest.mark.parametrize("extensions", [VRM0, VRM1], ids=["VRM 0", "VRM 1"])
+def test_its_expressions_are_animated_as_weights_of_their_meshes(
+    tmp_path, caplog, extensions
+) -> None:
+    caplog.set_level("INFO", "facert")
+    extensions = json.loads(json.dumps(extensions))
+    if "VRM" in extensions:
+        groups = extensions["VRM"]["blendShapeMaster"]["blendShapeGroups"]
+        groups[0]["materialValues"] = [{"materialName": "face"}]
+    else:
+        joy = extensions["VRMC_vrm"]["expressions"]["preset"]["joy"]
+        joy["materialColorBinds"] = [{"material": 0}]
+    path = avatar(tmp_path / "face.vrm", extensions)
+    values, out = np.array([[0.0, 0.2, 1.0], [0.4, 0.5, 0.0]]), tmp_path / "out.glb"
+    character = Character(path, "expressions")
+    character.write(("Joy", "JawOpen", "A"), values, np.arange(2.0), out)
+    with open_gltf(out) as document:
+        assert document.root["extensions"] == extensions
+        animation = document.root["animations"][0]
+        found = [document.numbers(one["output"])[:, 0] for one in animation["samplers"]]
+    joy, jaw, a = values.T
+    np.testing.assert_allclose(found[0].reshape(2, 2), np.stack([joy / 2 + a, jaw], axis=1))
+    np.testing.assert_allclose(found[1], a / 4)
+    assert "to materials is left aside: joy" in caplog.text.lower()
