@@ -55,8 +55,9 @@ def rig_morphs(rig: Rig, params: FloatArray, time: FloatArray, fps: float = 30.0
 
 
 def moving_morphs(morphs: Morphs) -> Morphs:
-    """Those targets whose weights do not stay at 0; the first where all do."""
-    moving = np.flatnonzero(np.any(morphs.weights != 0, axis=0))
+    """Those targets that move something, at some time; the first where none does."""
+    used = np.any(morphs.weights != 0, axis=0) & morphs.targets.any(axis=(1, 2))
+    moving = np.flatnonzero(used)
     moving = moving if len(moving) else np.arange(1)
     names = tuple(morphs.names[index] for index in moving)
     weights, targets = morphs.weights[:, moving], morphs.targets[moving]

@@ -117,6 +117,7 @@ class FacePart(Part):
         subject: int | None = None,
     ) -> None:
         super().__init__(server, label, mesh.vertices[:subject])
+        self.width = float(np.ptp(mesh.vertices[:, 0])) * self._scale
         self._faces, self._own = mesh.faces, own
         self._caps = caps_of(mesh.vertices, mesh.faces)
         self._applied: Paint | None = None

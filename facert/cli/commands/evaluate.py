@@ -10,10 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from facert.cli.shared import console
-from facert.cli.shared.files import require_name, require_report, save_json, save_picture
+from facert.cli.shared.files import (
+    read_character,
+    require_name,
+    require_report,
+    save_json,
+    save_picture,
+)
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     DEVICE,
+    DRIVERS,
     OVERWRITE,
     RIG,
     SEED,
@@ -79,6 +86,7 @@ def command(
     ] = "random",
     across: Annotated[Path | None, file_option("Test on this take instead.")] = None,
     rig: RIG = None,
+    drivers: DRIVERS = None,
     shapes: SHAPES = None,
     test_frames: Annotated[
         int | None, option("Test on so many frames at most.", show_default="all")
@@ -107,7 +115,7 @@ def command(
     facert eval --labels 10..40 --json figures.json --plot figures.png
     """
     paths = paths or []
-    require_inputs(*paths, across, rig)
+    require_inputs(*paths, across, rig, drivers)
     if json_path is not None:
         require_report(json_path, overwrite)
     if plot is not None:
@@ -123,7 +131,7 @@ def command(
     from facert.evaluation.protocol import Protocol, draw, make_problem
     from facert.evaluation.run import journal_beside
     from facert.evaluation.table import summarise
-    from facert.io.formats import read_rig_file, read_take_file, targets_for
+    from facert.io.formats import read_take_file, targets_for
     from facert.models.device import find_device
     from facert.preprocess.label_checks import warn_of_labels
     from facert.settings import Settings
@@ -141,7 +149,7 @@ def command(
             as_takes(takes or training_take(posed=None), (), short_names(paths)),
             protocol,
             None if across is None else read_take_file(across, target=of_across),
-            None if rig is None else read_rig_file(rig, shapes),
+            read_character(rig, shapes, drivers),
         )
         warn_of_labels(problem.take)
         grid = chosen_grid(problem, chosen, *numbers, repeats)
@@ -157,6 +165,7 @@ def command(
             "across": across,
             "rig": rig,
             "shapes": shapes,
+            "drivers": drivers,
         }
         content = {"settings": _facts(files, problem, grid), "rows": list(map(asdict, rows))}
         save_json(content, json_path, overwrite)

@@ -169,8 +169,7 @@ def _write_moved(
         assert controls is not None  # poses come with controls
         return character.write(controls.names, poses, posed.time, output, overwrite)
     if wanted.drivers is not None:
-        fix = "Leave it out: other files show shapes alone."
-        raise InputError("--drivers", ".glb from a .glb, .gltf or .vrm", output.name, fix)
+        console.log.warning("%s holds shapes alone: what drivers move stays at rest", output.name)
     morphs = _motion(take, wanted.rig, wanted, changes)
     morphs = morphs if output.suffix.lower() == ".glb" else moving_morphs(morphs)
     return _write_motion(morphs, output, overwrite)
@@ -179,7 +178,7 @@ def _write_moved(
 def _motion(take: Take, path: Path, wanted: Wanted, changes: Changes) -> Morphs:
     """The rig in the poses of a take."""
     with reading(path):
-        rig = formats.read_rig_file(path, wanted.shapes)
+        rig = formats.read_rig_file(path, wanted.shapes, wanted.drivers)
         # `--in-units` is the unit of IN: a rig that states its own unit keeps that, and in any case
         # its own up axis.
         stated = rig.units or changes.in_units

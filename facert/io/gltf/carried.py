@@ -54,7 +54,7 @@ class CarriedFile:
         if not author.startswith(MARK):
             author = f"{CREATED_BY}, from {author}" if author else CREATED_BY
         # First of all, as the mark is looked for at the beginning.
-        named = {"generator": author} | {key: asset[key] for key in asset if key != "generator"}
+        named = {"version": asset["version"], "generator": author} | asset | {"generator": author}
         root = {"asset": named} | {key: self.root[key] for key in self.root if key != "asset"}
         write_container(root, self.buffer, path, overwrite, self._others)
 
