@@ -25,13 +25,16 @@ from facert.preprocess.motion.series import even_grid
 from facert.preprocess.source_layout import SourceColumns
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
-from facert.retarget.novelty import novelty_warning, relative_residuals, usual_variance
+from facert.retarget.novelty import novelty_warning
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
+from facert.retarget.source_reasons import unlike
 from facert.retarget.stream import RetargetStream
 
 log = logging.getLogger(__name__)
 
 Mode = Literal["offline", "online"]
+JUDGED = {"judged": True}
+"""The mark of lines of the log that a verdict repeats."""
 
 
 @dataclass(frozen=True)
@@ -143,15 +146,19 @@ class Retargeter(TrainedModel):
         )
 
     def _warn_of_novelty(self, frames: FloatArray) -> None:
-        """Warn of cleaned, normalised frames (T, d_x) that are like no posed one."""
-        if self.labelled is None or not len(self.labelled):
+        """Warn of cleaned, normalised frames (T, d_x) that are like no posed one, by the cause.
+
+        Who judges the result afterwards says all of that: such lines are marked.
+        """
+        found = unlike(frames, self)
+        if found is None:
             return
-        posed = self.source_units.apply(self.labelled)
-        variance = usual_variance(posed, self.motion)
-        found = relative_residuals(frames, posed, variance, self.layout.kind)
-        warning = novelty_warning(found, self.layout.names)
+        for cause in (found.head_warning, found.placed_warning):
+            if cause:
+                log.warning("%s", cause, extra=JUDGED)
+        warning = novelty_warning(found.left, self.layout.names)
         if warning is not None:
-            log.warning("%s", warning)
+            log.warning("%s", warning, extra=JUDGED)
 
     def _performance(
         self, take: Take, source: Source, params: FloatArray, std: FloatArray | None

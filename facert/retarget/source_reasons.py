@@ -20,13 +20,23 @@ from facert.preprocess.clean_source import other_unit
 from facert.preprocess.faults import Reach, find_faults
 from facert.preprocess.head_motion import rigid_motion
 from facert.retarget.model import TrainedModel
-from facert.retarget.novelty import NEW, over_names, relative_lengths, unexplained, usual_variance
+from facert.retarget.novelty import (
+    LEAST_SHARE,
+    NEW,
+    over_names,
+    relative_lengths,
+    unexplained,
+    usual_variance,
+)
 from facert.retarget.reasons import found_in, level_of, most
 
 UNLIKE = ("head motion", "far from training", "new expressions", "other unit")
 """Kinds of reasons for which frames are unlike the posed ones."""
 EXPLAINED = 0.6
 """A cause is named where less than this share of what was unexplained is left without it."""
+ANYWAY = 0.2
+"""A rigid motion explains a part of whatever all frames have in common: it has to leave less than
+that explains anyway, and this share of the amount."""
 HEAD_MARKERS = 5
 """With fewer, an expression may pass for motion of the head."""
 MOVED = 0.5
@@ -71,6 +81,27 @@ class Unlike:
         """Frames that are unlike by themselves, (T,)."""
         return np.asarray(over_names(self.left) > NEW)
 
+    @property
+    def head_warning(self) -> str:
+        """A line for the log where the head moves in a part of the frames; empty else."""
+        if self.head.mean() < LEAST_SHARE:
+            return ""
+        degrees, share = self.degrees[self.head].max(), self.head.mean()
+        return (
+            f"in {share:.0%} of the frames the head moves, by up to {degrees:.0f} degrees against "
+            "the training take: facert stabilise takes that out"
+        )
+
+    @property
+    def placed_warning(self) -> str:
+        """A line for the log where all frames differ alike from the training take; empty else."""
+        if self.placed.mean() < 1.0 - LEAST_SHARE:
+            return ""
+        return (
+            "the source differs from the training take by the same amount throughout: another day "
+            "or actor? --neutral FRAMES names frames at rest"
+        )
+
 
 def unlike(frames: FloatArray, model: TrainedModel) -> Unlike | None:
     """Compare clean, normalised frames (T, d_x) with the posed ones; None for models without."""
@@ -85,7 +116,9 @@ def unlike(frames: FloatArray, model: TrainedModel) -> Unlike | None:
     if kind == "markers" and len(model.layout.names) >= HEAD_MARKERS:
         still, degrees, moved = _without_head(frames, posed, model)
         without = over_names(relative_lengths(still, variance, kind))
-        head = moved & (amounts > NEW) & (without < EXPLAINED * amounts)
+        steady = over_names(relative_lengths(vectors - np.median(vectors, axis=0), variance, kind))
+        better = without < np.minimum(EXPLAINED * amounts, steady + ANYWAY * amounts)
+        head = moved & (amounts > NEW) & better
         vectors = np.where(head[:, None], still, vectors)
     left = relative_lengths(vectors, variance, kind)
     common = np.median(vectors, axis=0)

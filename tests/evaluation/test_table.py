@@ -103,6 +103,25 @@ def test_advice_is_for_the_most_unlabelled_data():
     assert advise(outcomes).startswith("Use b")
 
 
+def test_advice_and_table_go_by_the_same_number_at_the_most_labels():
+    outcomes = table({"a": {10: [0.1] * 5, 20: [0.2] * 5}, "b": {10: [0.5] * 5, 20: [0.1] * 5}})
+    named = best([row for row in summarise(outcomes, Protocol()) if row.labels == 20]).method
+    assert advise(outcomes).startswith(f"Use {named} for this take.")
+
+
+def test_the_default_is_named_unless_it_is_clearly_beaten():
+    near = {"auto": {10: [0.11, 0.20]}, "a": {10: [0.10, 0.201]}}
+    assert advise(table(near)).startswith("Use auto for this take (a within one standard error")
+    far = {"auto": {10: [0.13, 0.23]}, "a": {10: [0.10, 0.201]}}
+    assert advise(table(far)).startswith("Use a for this take. ")
+
+
+def test_advice_tells_what_it_was_tested_on():
+    outcomes = table({"a": {10: [0.2] * 5}})
+    assert advise(outcomes, 30).endswith("Tested on 30 posed frames a draw.")
+    assert "extremes" in advise(outcomes, 30, chosen=True)
+
+
 def test_a_panel_is_drawn_for_each_number_that_varies():
     labels = table({"a": {10: [0.2], 20: [0.1]}})
     both = labels + table({"a": {10: [0.3], 20: [0.2]}}, unlabelled=0)

@@ -153,7 +153,7 @@ def _retarget(
     take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
     chosen = options(retargeter)
-    with reading(source):
+    with reading(source), console.without_judged():
         take = with_recording(take, source)
         result = retargeter.retarget(take, mode, chosen, device)
     seconds = time.perf_counter() - began

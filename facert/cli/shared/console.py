@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from rich.console import Console
 
@@ -25,6 +27,23 @@ class _StderrHandler(logging.Handler):
         prefix += f"{escaped(subject())}: " if subject() else ""
         lines = map(escaped, self.format(record).split("\n"))  # names in it may be foreign
         err.print(prefix + "\n".join(lines), style="yellow" if warning else None, markup=False)
+
+
+def _is_not_judged(record: logging.LogRecord) -> bool:
+    return not getattr(record, "judged", False)
+
+
+@contextmanager
+def without_judged() -> Iterator[None]:
+    """Leave out lines of the log that the verdict in the end will hold."""
+    handlers = list(log.handlers)
+    for handler in handlers:
+        handler.addFilter(_is_not_judged)
+    try:
+        yield
+    finally:
+        for handler in handlers:
+            handler.removeFilter(_is_not_judged)
 
 
 _FIGURES = {

@@ -30,15 +30,15 @@ def print_verdicts(verdicts: Verdicts, model: Path, many: bool) -> None:
     width = max((len(pair[0].name) for pair in order), default=0)
     for pair in order:
         verdict, name = verdicts[pair], pair[0].name
-        first, *others = verdict.reasons or (None,)
-        said = "" if first is None else _said(first, name, model)
-        if many and others:
-            kinds = dict.fromkeys(reason.kind for reason in others)
-            said += f" (also: {', '.join(kinds)})"
+        reasons = [r for r in verdict.reasons if not many or r.level != LEVELS[0]]
+        lines = [_said(reason, name, model) for reason in reasons] or [""]
+        if many and reasons[1:]:
+            kinds = dict.fromkeys(reason.kind for reason in reasons[1:])
+            lines = [f"{lines[0]} (also: {', '.join(kinds)})"]
         level = Text(f"{verdict.level:10}", style=COLOURS[verdict.level])
-        console.out.print(level, escaped(f"{name:{width}}  {said}".rstrip()), markup=False)
-        for reason in [] if many else others:
-            console.show(f"{'':{width + 13}}{escaped(_said(reason, name, model))}")
+        console.out.print(level, escaped(f"{name:{width}}  {lines[0]}".rstrip()), markup=False)
+        for line in lines[1:]:
+            console.show(f"{'':{width + 13}}{escaped(line)}")
 
 
 def _said(reason: Reason, take: str, model: Path) -> str:
