@@ -64,7 +64,7 @@ def correct_take(
         For a take that is no result, frames and controls that it has not, values outside of
         limits, or no character where one is needed.
     """
-    _require_result(result)
+    require_result(result)
     if not poses:
         raise InputError("frames", "one to correct", "none", "Name a frame and its controls.")
     frames = np.array(sorted(poses), dtype=np.int64)
@@ -77,8 +77,13 @@ def correct_take(
     return put_in(result, merged(result.corrections, made))
 
 
-def _require_result(take: Take) -> None:
-    """Refuse what was not retargeted, such as a recording with a few labels."""
+def require_result(take: Take) -> None:
+    """Refuse what was not retargeted, such as a recording with a few labels.
+
+    Raises
+    ------
+    InputError
+    """
     if take.controls is None or (take.std is None and len(take.labels) < FEWEST * len(take)):
         expected, found = "a result: a pose in every frame", f"{len(take.labels)} of {len(take)}"
         fix = "Retarget it first; poses of a recording are added by facert convert --poses."

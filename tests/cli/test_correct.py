@@ -122,6 +122,23 @@ def test_whole_poses_come_from_a_table(facert, shot, tmp_path):
     np.testing.assert_allclose(made.params[30], pose)
 
 
+def test_controls_that_a_table_lacks_follow_or_stay(facert, shot, tmp_path):
+    (tmp_path / "poses.csv").write_text("frame,JawOpen\n30,0.4\n")
+    done = facert("correct", "shot.h5", "--poses", "poses.csv", "-o", "follow.h5")
+    assert done.code == 0, done.err
+    asked = ("--frame", 30, "--set", "jawOpen=0.4", "-o", "set.h5")
+    assert facert("correct", "shot.h5", *asked).code == 0
+    assert (api.read_take("follow.h5").params == api.read_take("set.h5").params).all()
+    assert facert("correct", "shot.h5", "--poses", "poses.csv", "--only", "-o", "only.h5").code == 0
+    only = api.read_take("only.h5").params[30]
+    assert only.tolist() == [0.4, *shot.params[30, 1:]]
+    (tmp_path / "poses.csv").write_text("frame,jawOpne\n30,0.4\n")
+    failed = facert("correct", "shot.h5", "--poses", "poses.csv", "-o", "x.h5")
+    assert failed.code == 3
+    assert "poses.csv: " in failed.err
+    assert "jawOpen" in failed.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -138,7 +155,7 @@ def test_whole_poses_come_from_a_table(facert, shot, tmp_path):
         (("--set", "jawOpen=0.1"), 2, "give both --frame and --set"),
         ((), 2, "give --frame with --set NAME=VALUE, or one of"),
         (("--frame", 3, "--set", "jawOpen=0.1", "--list"), 2, "or one of"),
-        (("--list", "--only"), 2, "--hold and --only are for --frame"),
+        (("--list", "--only"), 2, "--hold and --only are for --set"),
         (("--frame", 3, "--set", "jawOpen=0.1", "--width", -1), 2, "--width"),
         (("--frame", 3, "--set", "jawOpen=0.1", "-o", "curves.csv"), 3, "expected .h5"),
         (("--frame", 3, "--set", "jawOpen=0.1", "-m", "none.safetensors"), 3, "none.safetensors"),

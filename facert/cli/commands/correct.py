@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +17,11 @@ from facert.errors import InputError, reading
 from facert.io.registry import OWN_ENDINGS, require_replaceable
 
 if TYPE_CHECKING:
+    from facert.data.arrays import FloatArray
     from facert.data.take import Take
+
+    Corrected = Mapping[int, Mapping[str, float] | FloatArray]
+    """For each frame the controls that are set, or a whole pose (P,)."""
 
 ALL = "all"
 NAMED, LINES = 3, 10  # controls that are named, and frames that have a line
@@ -36,7 +41,7 @@ def command(
     ] = False,
     poses: Annotated[
         Path | None,
-        file_option("Whole poses instead, by a column frame or by time: of Blender, or a take."),
+        file_option("Poses instead, by a column frame or by time: of Blender, or a take."),
     ] = None,
     width: Annotated[
         float | None,
@@ -78,24 +83,26 @@ def command(
     facert correct retargeted.h5 --list
     """
     _require_one(frames, bool(wanted) + confirm, poses, remove, show)
-    if (hold or only) and not wanted:
-        raise typer.BadParameter("--hold and --only are for --frame with --set")
+    if (hold or only) and not (wanted or poses):
+        raise typer.BadParameter("--hold and --only are for --set and --poses")
     require_inputs(path, poses)
     take = _read(path)
     if show:
         return _list(take)
+    from facert.posing.corrected_take import require_result
+
     output = output or path
     _require_output(output, overwrite)
     with reading(path):
         if remove:
             made = _without(take, remove)
-        elif poses is not None:
-            made = _with_poses(take, poses, width)
-        elif confirm:
-            made = _confirmed(take, frames)
         else:
-            given = parse_controls(wanted or [])
-            made = _with_set(take, frames, given, width, hold or [], only, model)
+            require_result(take)
+            if poses is not None:
+                corrected = _of_file(take, poses)
+            else:
+                corrected = _of_options(take, frames, parse_controls(wanted or []))
+            made = _corrected(take, corrected, width, hold or [], only, model)
     _write(take, made, path, output)
 
 
@@ -131,47 +138,58 @@ def _require_output(output: Path, overwrite: bool) -> None:
     require_replaceable(output, overwrite)
 
 
-def _with_set(
+def _corrected(
     take: Take,
-    frames: str,
-    given: dict[str, float],
+    poses: Corrected,
     width: float | None,
     hold: list[str],
     only: bool,
     model: Path | None,
 ) -> Take:
-    """The take with some controls set in some frames; the others follow."""
+    """The take with poses corrected; with a model where some of their controls are to follow."""
     import facert
     from facert.data.corrections import WIDTH
-    from facert.data.ranges import parse_frames
 
-    character = None if only else facert.load(model or DEFAULT_MODEL)
-    wanted = dict.fromkeys(parse_frames(frames, "--frame"), given)
+    whole = not any(isinstance(pose, Mapping) for pose in poses.values())
+    character = None if only or whole else facert.load(model or DEFAULT_MODEL)
     width = WIDTH if width is None else width
-    return facert.correct(take, wanted, character, width=width, hold=hold, only=only)
+    return facert.correct(take, poses, character, width=width, hold=hold, only=only)
 
 
-def _confirmed(take: Take, frames: str) -> Take:
-    """The take with the poses of some frames as they are, now somebody's."""
-    import facert
+def _of_options(take: Take, frames: str, given: Mapping[str, float]) -> Corrected:
+    """Controls that are set in some frames; without any, their poses as they are."""
     from facert.data.ranges import parse_frames
 
     asked = parse_frames(frames, "--frame")
-    if take.params is None or asked[-1] >= len(take):
-        return facert.correct(take, {asked[-1]: {}}, only=True)  # it says why not
-    return facert.correct(take, {frame: take.params[frame] for frame in asked})
+    assert take.params is not None  # it is a result
+    if given or asked[-1] >= len(take):  # correcting says what is wrong
+        return dict.fromkeys(asked, given)
+    return {frame: take.params[frame] for frame in asked}
 
 
-def _with_poses(take: Take, path: Path, width: float | None) -> Take:
-    """The take with whole poses of a table or another take."""
-    import facert
-    from facert.data.corrections import WIDTH
+def _of_file(take: Take, path: Path) -> Corrected:
+    """Poses of a table or another take: whole ones, or those of the controls that it has."""
+    from dataclasses import replace
+
     from facert.data.labelling import placed
+    from facert.data.names import match
+    from facert.data.take import Controls
     from facert.io.poses import read_poses
 
-    frames, _, values = placed(take, read_poses(path))
-    wanted = dict(zip(frames.tolist(), values, strict=True))
-    return facert.correct(take, wanted, width=WIDTH if width is None else width)
+    poses = read_poses(path)
+    assert take.controls is not None  # it is a result
+    assert take.params is not None
+    with reading(path):
+        columns = match(poses.names, take.controls.names, "names of the poses")
+    names = tuple(take.controls.names[column] for column in columns)
+    params = take.params[:, columns]
+    part = replace(take, controls=Controls(names), params=params, std=None, corrections=None)
+    frames, _, values = placed(replace(part, animation=None), poses)
+    if len(names) < len(take.controls.names):
+        rows = ({name: float(v) for name, v in zip(names, row, strict=True)} for row in values)
+        return dict(zip(frames.tolist(), rows, strict=True))
+    ordered = values[:, match(take.controls.names, names, "names of the poses")]
+    return dict(zip(frames.tolist(), ordered, strict=True))
 
 
 def _without(take: Take, remove: str) -> Take:
@@ -233,6 +251,8 @@ def _moves(before: Take, after: Take, frame: int) -> str:
     names = before.controls.names
     moves = [f"{printable(names[index])} {old[index]:.3f} to {new[index]:.3f}" for index in shown]
     others = int((sizes > SMALL * sizes.max()).sum()) - len(shown)
+    if not moves:
+        return "right as predicted"
     return ", ".join(moves) + (f" and {plural(others, 'other')}" if others > 0 else "")
 
 
