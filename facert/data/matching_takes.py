@@ -16,11 +16,12 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.labelling import predicted_poses
 from facert.data.names import NameIndex, match, nearest
+from facert.data.subject import about
 from facert.data.take import Controls, Source, Take, named_curves
 from facert.data.takes import Takes
 from facert.data.text import listed, plural
 from facert.data.units import checked_unit, with_units, with_up_axis
-from facert.errors import InputError, reading
+from facert.errors import InputError
 
 log = logging.getLogger("facert")
 
@@ -45,7 +46,8 @@ def as_takes(
         Poses of the character without a frame: the poses of a take, and its animation; of one
         without controls, its weights. Controls are matched in any spelling.
     names, animation_names : sequence of str
-        The files, for messages; by default "take 1", "animation 1" and so on.
+        The files, for messages; by default "take 1", "animation 1" and so on. A single take has
+        no name in them.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def as_takes(
     if not parts:
         raise InputError("takes", "a take at least", "none", "Give one.")
     old = [animation] if isinstance(animation, Take) else list(animation)
-    names = tuple(names) or _numbered("take", len(parts))
+    names = ("",) if len(parts) == 1 else tuple(names) or _numbered("take", len(parts))
     if len(parts) == 1 and not old:
         return Takes((parts[0],), names, parts[0].animation)
     animation_names = tuple(animation_names) or _numbered("animation", len(old))
@@ -72,7 +74,7 @@ def as_takes(
     parts = [_with_controls(*one, controls) for one in zip(parts, names, strict=True)]
     rows = [part.animation for part in parts if part.animation is not None]
     for one in poses:
-        with reading(one.name):
+        with about(one.name):
             rows.append(_animation(one, controls))
     return Takes(tuple(parts), names, np.concatenate(rows) if rows else None)
 
@@ -122,12 +124,12 @@ def _converted(part: Take, name: str, first: Take) -> Take:
     if part.source.kind == "weights":
         return part
     found = part
-    with reading(name):
+    with about(name):
         if first.units and part.units != first.units:
             wanted = checked_unit(first.units, "units of the first take")
+            found = _take(with_units(found, wanted), first.units)
             if part.units:
                 log.info("%s: converted from %s to %s", name, part.units, wanted)
-            found = _take(with_units(found, wanted), first.units)
         if first.up_axis and part.up_axis and part.up_axis != first.up_axis:
             log.info("%s: turned so that %s points up", name, first.up_axis)
             found = _take(with_up_axis(found, first.up_axis, part.up_axis), found.units)
@@ -145,7 +147,7 @@ def _union(
     """All names, those of the first take first, and the place of each take's among them."""
     known, columns = list(lists[0]), [list(range(len(lists[0])))]
     for names, file in zip(lists[1:], files[1:], strict=True):
-        with reading(file):
+        with about(file):
             index = NameIndex.among(known, names, "/source/names")
             found = [index.find(name) for name in names]
             _require_same_set(names, found, known, files[0])
@@ -239,7 +241,7 @@ def _limits(one: Named, controls: Controls) -> FloatArray | None:
 def _reach(one: Named, controls: Controls) -> FloatArray:
     """Least and largest value of these controls in the poses of a take, (P, 2)."""
     names, poses = _poses_without_frames(one)
-    with reading(one.name):
+    with about(one.name):
         columns = match(controls.names, names, "/target/names")
     return np.stack([poses.min(axis=0), poses.max(axis=0)], axis=1)[columns]
 
@@ -252,7 +254,7 @@ def _with_controls(part: Take, name: str, controls: Controls) -> Take:
     own = part.controls.names
     if own == controls.names and part.controls.limits is controls.limits:
         return part
-    with reading(name):
+    with about(name):
         columns = match(controls.names, own, "/target/names")
         if len(columns) != len(own):
             extra = next(name for place, name in enumerate(own) if place not in columns)

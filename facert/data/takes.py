@@ -29,7 +29,7 @@ class Takes:
     ----------
     parts : sequence of Take
     names : sequence of str
-        Of each take, for messages: its file.
+        Of each take, for messages: its file; empty for a single one.
     animation : array, shape (n, P), or None
         Poses without a frame: those of all takes, and others.
     """
@@ -46,8 +46,7 @@ class Takes:
     @property
     def named(self) -> list[tuple[Take, str]]:
         """Each take with its name; a single one needs none."""
-        names = self.names if len(self.parts) > 1 else ("",)
-        return list(zip(self.parts, names, strict=True))
+        return list(zip(self.parts, self.names, strict=True))
 
     @property
     def labels(self) -> int:
@@ -78,10 +77,10 @@ class Takes:
         return np.concatenate([own + start for own, start in zip(frames, starts, strict=True)])
 
     def frame_name(self, frame: int) -> str:
-        """A frame of `joined` for people: its number, with the file where there are several."""
+        """A frame of `joined` for people: its number, with the file where the take has a name."""
         takes, numbers = self.located(np.array([frame]))
-        number = str(numbers[0])
-        return number if len(self.parts) == 1 else f"{self.names[takes[0]]}:{number}"
+        name = self.names[takes[0]]
+        return f"{name}:{numbers[0]}" if name else str(numbers[0])
 
     @cached_property
     def joined(self) -> Take:

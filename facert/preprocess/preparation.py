@@ -95,7 +95,7 @@ def training_data(given: Take | Takes, settings: Settings) -> TrainingData:
         raise InputError("/target", "poses in some frames", "none", fix)
     prepared = prepare(takes, settings)
     clean = prepared.take
-    chosen = choose_training_set(clean, settings)
+    chosen = choose_training_set(prepared.takes.posed, settings)
     poses = np.vstack([chosen.Y_labelled, chosen.Y_unlabelled])
     return TrainingData(
         prepared=prepared,

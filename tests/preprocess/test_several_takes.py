@@ -14,6 +14,7 @@ from facert.preprocess.motion.estimate import estimate
 from facert.preprocess.motion.motion import Motion
 from facert.preprocess.neutral import rest_frames
 from facert.preprocess.preparation import prepare, training_data
+from facert.preprocess.training_set import choose_training_set, serving
 from facert.settings import Settings
 
 
@@ -126,3 +127,16 @@ def test_a_take_that_lies_elsewhere_is_warned_of(takes, caplog):
     far = replace(takes[1], source=Source(takes[1].source.values + 20.0, takes[1].source.names))
     prepare(as_takes([takes[0], far], names=("a.h5", "b.h5")), Settings(smooth=False))
     assert "b.h5 lies far from a.h5" in caplog.text
+
+
+def test_a_take_gives_frames_in_proportion_to_its_labels(make_take):
+    """All of the take with most labels, so many a label of the others."""
+    takes = as_takes([make_take(frames=f, posed=p) for f, p in ((80, 20), (200, 5), (10, 5))])
+    first, second, third = np.split(serving(takes, 0), takes.starts[1:-1])
+    assert first.all()
+    assert second.sum() == 20
+    assert third.all()
+    assert serving(as_takes(takes.parts[1]), 0).all()
+    chosen = choose_training_set(takes, Settings(unlabelled=None))
+    assert len(chosen.X_labelled) == 30
+    assert len(chosen.X_unlabelled) <= 60 + 20 + 5

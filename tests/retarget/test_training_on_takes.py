@@ -100,6 +100,17 @@ def test_a_slip_among_labels_is_named_with_its_file(takes, caplog) -> None:
     assert "the pose of frame b.h5:8 has smile at 400" in caplog.text
 
 
+def test_a_posed_frame_that_shows_too_little_is_named_with_its_file(takes, caplog) -> None:
+    values = takes[1].source.values.copy()
+    values[8, :4] = np.nan
+    hidden = replace(takes[1], source=Source(values, takes[1].source.names))
+    facert.train(Takes((replace(takes[0], params=None), hidden), ("a.h5", "b.h5")), PLAIN)
+    assert "left out (b.h5:8)" in caplog.text
+    caplog.clear()
+    facert.train(Takes((takes[0], hidden), ("a.h5", "b.h5")), PLAIN)
+    assert "1 posed frames show less than half of the source: left out (b.h5:8)" in caplog.text
+
+
 def test_a_shared_model_starts_from_one_of_fewer_takes(takes, caplog) -> None:
     settings = Settings(method="ssgplvm", smooth=False, detect=False, latent_dim=2, unlabelled=10)
     first = facert.train(takes[0], replace(settings, max_iterations=3))
