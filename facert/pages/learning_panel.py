@@ -8,14 +8,13 @@ from viser import Icon
 
 from facert.data.moments import frame_label
 from facert.data.verdict import Verdict
+from facert.pages.posed_take import PosedTake
 from facert.pages.session import Trained
 from facert.pages.take_panel import Place
 from facert.pages.widgets import ButtonList, Text
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-    from facert.data.take import Take
 
 TRAIN, TRAINING = "Train on the labels", "Training ..."
 LOOKED_AT = 5  # frames
@@ -60,18 +59,23 @@ class LearningPanel:
         """Show what came of a training."""
         lines = [f"Learned from {trained.labels} labels in {trained.seconds:.1f} s."]
         if trained.error is not None:
-            lines.append(f"Error at labels left out: {trained.error:.3f} (RMS).")
+            lines.append(
+                f"Error at poses left out: {trained.error:.3f} (RMS), mostly that of extremes."
+            )
         if trained.change is not None:
             lines.append(f"Poses moved by {trained.change:.3f} (RMS).")
         self.outcome.write("\n".join([*lines, f"{file} is written."]))
 
-    def show_verdict(self, verdict: Verdict | None, take: int, recording: Take | None) -> None:
+    def show_verdict(self, verdict: Verdict | None, take: int, part: PosedTake | None) -> None:
         """Show what to think of a take, why, and its frames to look at first."""
-        if verdict is None or recording is None:
+        if verdict is None or part is None:
             self._verdict.write("")
             self._worst.show({})
             return
+        recording, name = part.recording, part.name
         reasons = [f"{reason.kind}: {reason.text}" for reason in verdict.reasons]
-        self._verdict.write("\n".join([f"Verdict: {verdict.level}.", *reasons]))
+        matter = [reason for reason in verdict.reasons if reason.level != "good"]
+        cures = dict.fromkeys(reason.cure_for(name, "MODEL") for reason in matter)
+        self._verdict.write("\n".join([f"Verdict: {verdict.level}.", *reasons, *cures]))
         worst = verdict.worst(LOOKED_AT).tolist()
         self._worst.show({(take, f): f"frame {frame_label(recording, f)}" for f in worst})

@@ -114,8 +114,7 @@ class PosePage(PoseEditing):
     def _judge(self) -> None:
         take, part = self.session.here, self.session.part
         verdict: Verdict | None = self.session.verdict()
-        recording = None if part is None else part.recording
-        self.worker.do("judged", lambda: self._learning.show_verdict(verdict, take, recording))
+        self.worker.do("judged", lambda: self._learning.show_verdict(verdict, take, part))
 
     def _suggest(self) -> None:
         """Find the frames to pose next, in the slow worker."""
@@ -141,5 +140,6 @@ class PosePage(PoseEditing):
             }
         )
         rest, labels = sum(shares.values()), self.session.labels
-        covered = f"The {labels} labels stand for {1 - rest:.0%} of the frames" if labels else ""
-        self._takes.coverage.write(f"{covered}, these would for {rest:.0%}." if labels else "")
+        others = f"; these frames would for {rest:.0%}" if shares else ""
+        covered = f"The {labels} labels stand for {1 - rest:.0%} of all frames{others}."
+        self._takes.coverage.write(covered if labels else "")

@@ -130,11 +130,16 @@ class PosingSession:
 
     @property
     def known(self) -> KnownPoses | None:
-        """The poses that the character is known to make; None when they are too few."""
+        """The poses that the character is known to make; None when they are too few.
+
+        Where nobody set enough, those that were predicted for a result count.
+        """
         labels = [label.pose for part in self.parts for label in part.labels.values()]
         old = [part.recording.animation for part in self.parts]
         if not any(one is not None for one in old):
             old = [self._animation]
+        if len(labels) + sum(len(one) for one in old if one is not None) < LEAST:
+            old = [part.result.params for part in self.parts if part.is_result and part.result]
         there = [one for one in old if one is not None]
         poses = keep(
             np.array(labels).reshape(len(labels), len(self.controls.names)),

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.io.video_frames import VideoFrames
 from facert.pages.charts import Chart
 from facert.pages.keys import add_play_keys
 from facert.pages.paint import Paint, Scale, skin
 from facert.pages.stage import ActorParts, FacePart, Stage, face_part
+from facert.pages.video_part import VideoPart
 from facert.pages.view_data import Performance, highest
 from facert.pages.widgets import ButtonList, Timeline
 from facert.pages.worker import PlayedPage
@@ -36,14 +38,20 @@ class ViewPage(PlayedPage):
     performance : Performance
     actor : Face, optional
         The actor's face, for a source of weights; markers are drawn as they are.
+    video : VideoFrames, optional
+        The performer's.
     """
 
     def __init__(
-        self, server: ViserServer, performance: Performance, actor: Face | None = None
+        self,
+        server: ViserServer,
+        performance: Performance,
+        actor: Face | None = None,
+        video: VideoFrames | None = None,
     ) -> None:
         super().__init__(server, performance.take.time, WIDTH)
         self.performance = performance
-        self._faces = _Faces(server, performance, actor)
+        self._faces = _Faces(server, performance, actor, video)
         self._timeline = Timeline(server, performance.take, self)
         self._timeline.mark(performance.key_poses)
         self._add_colours()
@@ -121,10 +129,19 @@ class ViewPage(PlayedPage):
 class _Faces:
     """The stage of the page: the actor, the character, and the truth."""
 
-    def __init__(self, server: ViserServer, performance: Performance, actor: Face | None) -> None:
+    def __init__(
+        self,
+        server: ViserServer,
+        performance: Performance,
+        actor: Face | None,
+        video: VideoFrames | None,
+    ) -> None:
         self._performance = performance
         self.scale: Scale = performance.scale()
         stage = Stage(server)
+        self._video = None
+        if video is not None:
+            self._video = stage.add(VideoPart(server, video, performance.take.time))
         self._actor = ActorParts(server, stage, performance.take.source, actor)
         self._faces: list[tuple[Face, FacePart]] = []
         if performance.face is not None:
@@ -144,6 +161,8 @@ class _Faces:
         """A frame, with the character in some of `colours`."""
         rows: IntArray = np.array([frame])
         self._actor.draw(frame)
+        if self._video is not None:
+            self._video.draw(frame)
         for face, part in self._faces:
             vertices = face.motion.fetch(rows)[0]
             paint = self._paint(frame, colours) if face is self._performance.face else None

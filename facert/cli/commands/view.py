@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from facert.cli.shared.files import read_actor, read_character
+from facert.cli.shared.files import open_footage, read_actor, read_character
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import (
     ACTOR,
@@ -16,6 +16,8 @@ from facert.cli.shared.options import (
     SHAPES,
     TARGET,
     TRUTH,
+    VIDEO,
+    VIDEO_START,
     argument,
     option,
 )
@@ -37,6 +39,8 @@ def command(
         Path | None, option("Retarget TAKE with this model first.", "--model", "-m")
     ] = None,
     actor_path: ACTOR = None,
+    video_path: VIDEO = None,
+    video_start: VIDEO_START = None,
     target: TARGET = None,
     shapes: SHAPES = None,
     host: HOST = "127.0.0.1",
@@ -67,8 +71,9 @@ def command(
     with reading(path):
         performance = _performance(take, rig, truth, retargeter)
         actor = read_actor(take, actor_path, shapes)
+    video = open_footage(video_path, take, video_start)
     with page_server(path.name, host, port) as server:
-        page = ViewPage(server, performance, actor)
+        page = ViewPage(server, performance, actor, video)
         wait_for_end(address(server))
         page.stop()
 
