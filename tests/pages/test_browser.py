@@ -15,6 +15,8 @@ pytest.importorskip("viser", reason="viser is not installed")
 import facert
 from facert.data.rig import Rig
 from facert.data.take import Take
+from facert.io.video import write_clip
+from facert.io.video_frames import open_video
 from facert.pages.pose_page import PosePage
 from facert.pages.server import address, page_server
 from facert.pages.session import PosingSession
@@ -202,6 +204,66 @@ def test_keys_are_the_pages_after_a_click_and_do_not_turn_the_camera(pose_page) 
     assert seen.until(lambda: len(page.editor.pins) == 1)
     np.testing.assert_array_equal(client.camera.position, before)
     assert seen.errors == []
+
+
+def test_two_takes_one_of_them_a_result_are_corrected_and_trained_on(
+    visit, rig, recording, retargeter, tmp_path
+) -> None:
+    labels = np.where(np.arange(60)[:, None] % 6 == 0, recording.params, np.nan)
+    takes = [replace(recording, params=labels), retargeter.retarget(recording)]
+    paths = [tmp_path / "a.posed.h5", tmp_path / "<b>.h5"]
+    names = [path.name for path in paths]
+    session = PosingSession(retargeter.controls, takes, retargeter, paths, names)
+    with posing(visit, rig, session) as (page, seen):
+        button = lambda name: seen.page.get_by_role("button", name=name)  # noqa: E731
+        written = lambda: facert.read_take(paths[1]).corrections  # noqa: E731
+        seen.page.get_by_role("combobox", name="take").click()
+        seen.page.get_by_role("option", name="<b>.h5").click()
+        assert seen.until(lambda: session.here == 1)
+        seen.page.keyboard.press("Shift+ArrowRight")
+        assert seen.until(lambda: page.playback.frame == 10)
+        seen.slide("jaw_open", 0.9)
+        assert seen.until(lambda: len(page.editor.pins) == 1)
+        button("Save as this frame's pose").click()
+        assert seen.until(lambda: seen.page.get_by_text("saved to <b>.h5").count() == 1)
+        assert written().frames.tolist() == [10]
+        seen.slide("blend over (s)", 1.0)
+        assert seen.until(lambda: written().width.tolist() == [1.0])
+        seen.page.keyboard.press("ArrowRight")
+        assert seen.until(lambda: page.playback.frame == 11)
+        predicted = session.result.params[11]
+        assert np.abs(page.editor.pose - predicted).max() > 0.05  # blended
+        seen.page.keyboard.press("ArrowLeft")
+        assert seen.until(lambda: seen.page.get_by_text("A corrected frame.").count() == 1)
+        button("Take this frame's pose back").click()
+        assert seen.until(lambda: written() is None)
+        seen.page.keyboard.press("Control+z")
+        assert seen.until(lambda: written() is not None)
+
+        button("Train on the labels").click()
+        assert seen.until(lambda: seen.page.get_by_text("Learned from 11 labels").count() == 1)
+        assert seen.until(lambda: seen.page.get_by_text("labels stand for").count() == 1)
+        assert seen.until(lambda: seen.page.get_by_text("Verdict:").count() == 1)
+        assert written().frames.tolist() == [10]
+        button("<b>.h5:").or_(button("a.posed.h5:")).first.click()
+        assert seen.until(lambda: page.playback.frame != 10)
+        assert seen.errors == []
+
+
+def test_a_performers_video_stands_beside_the_character(visit, rig, recording, tmp_path) -> None:
+    path = tmp_path / "clip.mp4"
+    shades = (np.full((32, 48, 3), 250 * (number > 15), np.uint8) for number in range(60))
+    write_clip(shades, path, 30.0)
+    session = PosingSession(recording.controls, recording, output=tmp_path / "take.posed.h5")
+    video = open_video(path, recording)
+    with page_server("take.h5", port=0) as server:
+        page = PosePage(server, rig, session, video=video)
+        with visit(address(server)) as seen:
+            assert seen.until(lambda: (seen.picture().max(axis=2) < 0.1).mean() > 0.02)
+            page.seek(30)
+            assert seen.until(lambda: (seen.picture().max(axis=2) < 0.1).mean() < 0.01)
+            assert seen.errors == []
+        page.stop()
 
 
 def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
