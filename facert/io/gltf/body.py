@@ -15,7 +15,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.rig import CLAY
-from facert.data.text import listed
+from facert.data.text import listed, printable
 from facert.io.gltf.parts import (
     GAMMA,
     PlacedMesh,
@@ -53,7 +53,7 @@ def body_of(scene: Scene, face: FloatArray, nodes: Sequence[int] = ()) -> Placed
         name = _name(scene, one)
         left -= _count(scene, one)
         if left < 0:
-            log.warning("%s and what follows are too large to be shown", name)
+            log.warning("%s and what follows are too large to be shown", printable(name))
             break
         if _material(scene, one).get("alphaMode") == _SEEN_THROUGH:
             clear[name] = None
