@@ -204,7 +204,7 @@ class FACERT_PT_panel(bpy.types.Panel):  # type: ignore[misc]
             self.layout.operator(step.bl_idname, icon=icon)
         line, rate = timeline_of(context.scene), scene_rate(context.scene)
         self.layout.separator()
-        self.layout.label(text=f"Recording {line.rate:g}, scene {rate:g} frames/s")
+        self.layout.label(text=f"Take {line.rate:.5g} fps, scene {rate:.5g}")
 
 
 _CLASSES = (
@@ -245,7 +245,9 @@ def _in_export_menu(menu: Any, _: Any) -> None:
 
 def _draw(layout: Any, context: Any, *names: str) -> None:
     for name in names:
-        layout.prop(context.scene.facert, name)
+        # What a choice is for its words say; the panel is narrow.
+        plain = {"text": ""} if name in ("scope", "frames") else {}
+        layout.prop(context.scene.facert, name, **plain)
 
 
 def _report(operator: Any, step: Callable[[], Report]) -> set[str]:
