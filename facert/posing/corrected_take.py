@@ -83,8 +83,10 @@ def require_result(take: Take) -> None:
     Raises
     ------
     InputError
+        When most frames have no pose, and those that there are have no deviation.
     """
-    if take.controls is None or (take.std is None and len(take.labels) < FEWEST * len(take)):
+    bare = take.controls is None or take.params is None
+    if bare or (take.std is None and len(take.labels) < FEWEST * len(take)):
         expected, found = "a result: a pose in every frame", f"{len(take.labels)} of {len(take)}"
         fix = "Retarget it first; poses of a recording are added by facert convert --poses."
         raise InputError("/target/params", expected, found, fix)

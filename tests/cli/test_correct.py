@@ -150,7 +150,7 @@ def test_controls_that_a_table_lacks_follow_or_stay(facert, shot, tmp_path):
         (("--frame", 3, "--only", "--set", "jawOpen=3.5"), 3, "expected a value from -3 to 3"),
         (("--frame", 3, "--set", "jawOpen=nan"), 3, "jawOpen: expected a number, found nan"),
         (("--frame", 3, "--set", "jawOpen"), 2, "write it as in --set jawOpen=0.3"),
-        (("--frame", 3, "--set", "jawOpen=0.1", "--hold", "mout"), 3, "hold: expected a name"),
+        (("--frame", 3, "--set", "jawOpen=0.1", "--hold", "mout"), 3, "hold: expected controls"),
         (("--frame", 3), 2, "give both --frame and --set"),
         (("--set", "jawOpen=0.1"), 2, "give both --frame and --set"),
         ((), 2, "give --frame with --set NAME=VALUE, or one of"),
