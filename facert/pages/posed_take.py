@@ -13,8 +13,8 @@ from facert.data.arrays import FloatArray, IntArray
 from facert.data.corrections import WIDTH, put_in, taken_out
 from facert.data.labelling import predicted_poses, without_predicted
 from facert.data.names import match
-from facert.data.take import Controls, Corrections, Take
-from facert.io.take import write_take
+from facert.data.take import Controls, Corrections, Source, Take
+from facert.io.take import beside_recording, write_take
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class PosedTake:
     """
 
     recording: Take
-    """Without poses."""
+    """As it was recorded, without poses."""
     labels: Mapping[int, Label]
     """By their frames."""
     result: Take | None = None
@@ -88,8 +88,12 @@ class PosedTake:
             When the file cannot be written.
         """
         assert self.output is not None  # the caller has looked
-        made = self.shown if self.is_result and self.shown is not None else self.take
-        write_take(made, self.output, overwrite=True)
+        if self.is_result and self.shown is not None:
+            recorded = self.recording.source
+            beside = {} if recorded is self.shown.source else beside_recording(recorded)
+            write_take(self.shown, self.output, overwrite=True, beside=beside)
+        else:
+            write_take(self.take, self.output, overwrite=True)
         return self.output
 
 
@@ -102,11 +106,16 @@ def is_result(take: Take) -> bool:
 
 
 def posed_take(
-    take: Take, controls: Controls, output: Path | None = None, name: str = "take"
+    take: Take,
+    controls: Controls,
+    output: Path | None = None,
+    name: str = "take",
+    recorded: Source | None = None,
 ) -> PosedTake:
     """A take with its poses in the order of a character's controls.
 
-    Poses with a standard deviation were predicted: they are no labels.
+    Of a result, `recorded` is its source before it was cleaned, where its file keeps that. Poses
+    with a standard deviation were predicted: they are no labels.
 
     Raises
     ------
@@ -132,6 +141,8 @@ def posed_take(
         base = taken_out(take)
         params, std = _ordered(base.params, columns), _ordered(base.std, columns)
         result = replace(recording, params=params, std=std, animation=None)
+    if recorded is not None:
+        recording = replace(recording, source=recorded)
     return PosedTake(recording, labels, result, output, name, is_result(take))
 
 

@@ -13,7 +13,7 @@ from facert.data.corrections import WIDTH
 from facert.data.limits import bounds_of, rig_controls
 from facert.data.matching_takes import as_takes
 from facert.data.rig import Rig
-from facert.data.take import Controls, Take
+from facert.data.take import Controls, Source, Take
 from facert.data.verdict import Verdict
 from facert.errors import InputError
 from facert.io.registry import OWN_ENDINGS
@@ -59,6 +59,8 @@ class PosingSession:
         Where `put` writes a take with its labels. The model of `train` is beside the first.
     names : sequence of str
         Of each take, for people: its file.
+    recorded : sequence of Source
+        Of each take, before a result was cleaned.
 
     Raises
     ------
@@ -73,13 +75,17 @@ class PosingSession:
         model: Retargeter | None = None,
         output: Path | Sequence[Path] | None = None,
         names: Sequence[str] = (),
+        recorded: Sequence[Source] = (),
     ) -> None:
         self.controls, self.model, self.here = controls, model, 0
         takes = [] if take is None else [take] if isinstance(take, Take) else list(take)
         paths = list(output) if isinstance(output, Sequence) else [output] * len(takes)
         names = names or [f"take {number}" for number in range(1, len(takes) + 1)]
-        given = zip(takes, paths, names, strict=True)
-        self.parts = [posed_take(one, controls, path, name) for one, path, name in given]
+        sources = recorded or [one.source for one in takes]
+        given = zip(takes, paths, names, sources, strict=True)
+        self.parts = [
+            posed_take(one, controls, path, name, source) for one, path, name, source in given
+        ]
         self._saved: set[tuple[int, int]] = set()
         self._animation = model.poses if model is not None else None
         if model is not None:

@@ -8,6 +8,7 @@ import facert
 from facert.data.rig import Rig
 from facert.data.take import Controls
 from facert.errors import InputError
+from facert.io.take import with_recording
 from facert.pages.session import PosingSession, character_controls, output_beside
 
 NAMES = ["jaw", "smile", "brow", "blink"]
@@ -155,10 +156,10 @@ def model(make_take):
 @pytest.fixture
 def corrected(make_take, model, tmp_path) -> PosingSession:
     """A session on what retarget wrote."""
-    result = model.retarget(make_take(posed=0, animation=0))
-    path = tmp_path / "result.h5"
+    take, path = make_take(posed=0, animation=0), tmp_path / "result.h5"
+    result = model.retarget(take)
     assert output_beside(path, result) == path
-    return PosingSession(model.controls, result, output=path, names=["result.h5"])
+    return PosingSession(model.controls, result, None, path, ["result.h5"], [take.source])
 
 
 def test_a_changed_frame_of_a_result_is_a_correction_blended_and_taken_back(corrected) -> None:
@@ -168,6 +169,9 @@ def test_a_changed_frame_of_a_result_is_a_correction_blended_and_taken_back(corr
     written = facert.read_take(corrected.output)
     assert written.corrections.frames.tolist() == [20]
     np.testing.assert_allclose(written.params[20], pose)
+    np.testing.assert_array_equal(written.source.values, corrected.result.source.values)
+    recorded = with_recording(written, corrected.output).source
+    np.testing.assert_array_equal(recorded.values, corrected.part.recording.source.values)
     moved = np.abs(written.params - before).max(axis=1)
     assert 0 < moved[21] < moved[20]
     assert moved[30] == 0

@@ -85,6 +85,7 @@ def _require_one_take(files: Files) -> None:
 
 def _session(files: Files, rig: Rig, takes: list[Take], overwrite: bool) -> PosingSession:
     """The recordings with their model, and where their labels go."""
+    from facert.io.take import with_recording
     from facert.pages.session import PosingSession, character_controls, output_beside
 
     beside = [output_beside(path, one) for path, one in zip(files.takes, takes, strict=True)]
@@ -95,10 +96,12 @@ def _session(files: Files, rig: Rig, takes: list[Take], overwrite: bool) -> Posi
         raise typer.BadParameter("two takes would be saved to one file: rename one of them")
     model = _model(files)
     names = [path.name for path in files.takes]
+    pairs = zip(takes, files.takes, strict=True)
+    recorded = [with_recording(take, path).source for take, path in pairs]
     with reading(", ".join(map(str, files.takes)) or files.rig or ""):
         posed = next((one for one in takes if one.controls is not None), None)
         controls = character_controls(model, posed, rig)
-        return PosingSession(controls, takes, model, outputs[: len(takes)], names)
+        return PosingSession(controls, takes, model, outputs[: len(takes)], names, recorded)
 
 
 def _show_end(session: PosingSession, unsaved: list[str]) -> None:
