@@ -230,4 +230,5 @@ def test_nothing_else_in_the_package_opens_hdf5():
         for path in package.rglob("*.py")
         if re.search(r"^\s*(import|from)\s+h5py", path.read_text(), re.MULTILINE)
     }
-    assert users == {"io/hdf5.py"}
+    # What scripts share runs in Blender's and Maya's own Python, where facert is not installed.
+    assert users == {"io/hdf5.py", "io/importers/shared.py"}
