@@ -95,7 +95,10 @@ class Settings:
     target_kernel: Annotated[str, About("The same of the poses.", SHARED)] = "squared-exponential"
     limits: Annotated[
         LimitRule,
-        About("Clip poses: to declared limits, else to the range of all poses (auto), or not."),
+        About(
+            "Clip poses: to limits near all known poses, else to the range of these (auto); to "
+            "limits alone (declared); or not."
+        ),
     ] = "auto"
     likelihood: Annotated[
         Likelihood,

@@ -159,14 +159,13 @@ def _widened(
     names: Sequence[str], limits: FloatArray, poses: FloatArray, given: BoolArray
 ) -> FloatArray:
     """Limits (P, 2) that let in poses (n, P) a little beyond them, which the log names."""
-    away = beyond(limits, poses).max(axis=0, initial=0.0)
+    away = beyond(limits, poses)
     meant = ~given & (away > 0.0) & (away <= (OVERDRIVEN - 1.0) * _reach(limits))
     if not meant.any():
         return limits
-    low, high = poses.min(axis=0), poses.max(axis=0)
-    wider = np.stack([np.minimum(limits[:, 0], low), np.maximum(limits[:, 1], high)], axis=1)
-    ranges = [
-        f"{names[i]} {wider[i, 0]:.3g}..{wider[i, 1]:.3g}" for i in np.flatnonzero(meant).tolist()
-    ]
+    low = np.minimum(limits[:, 0], np.where(meant, poses, np.inf).min(axis=0))
+    high = np.maximum(limits[:, 1], np.where(meant, poses, -np.inf).max(axis=0))
+    widened = np.flatnonzero(meant.any(axis=0)).tolist()
+    ranges = [f"{names[i]} {low[i]:.3g}..{high[i]:.3g}" for i in widened]
     log.info("limits widened to poses beyond them: %s; --limits keeps them", listed(ranges))
-    return np.where(meant[:, None], wider, limits)
+    return np.stack([low, high], axis=1)

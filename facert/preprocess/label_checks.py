@@ -169,10 +169,9 @@ def _warn_of_slips(labels: _Labels, seen: BoolArray) -> None:
         )
     if labels.limits is None:
         return
-    outside = (beyond(labels.limits, labels.values) > 0.0) & ~absurd & ~seen
+    outside = np.where(absurd | seen, 0.0, beyond(labels.limits, labels.values))
     for control in np.flatnonzero(outside.any(axis=0))[:NAMED].tolist():
-        away = beyond(labels.limits, labels.values)[:, control]
-        row, (low, high) = int(away.argmax()), labels.limits[control]
+        row, (low, high) = int(outside[:, control].argmax()), labels.limits[control]
         value = labels.values[row, control]
         wider = f"{min(low, value):.3g}..{max(high, value):.3g}"
         log.warning(

@@ -65,10 +65,10 @@ def test_limits_that_a_take_has_stay(caplog) -> None:
 
 
 def test_an_overdriven_shape_widens_its_limit_but_no_slip_does(caplog) -> None:
-    take = posed([[1.2, 0, 40.0, -0.3], [0.9, 0, 0, 0.1]], [[0, 1]] * 4)
+    take = posed([[1.2, 0, 40.0, -0.3], [0.9, 0, -0.2, 50.0]], [[0, 1]] * 4)
     found = with_limits(take).controls.limits
-    np.testing.assert_allclose(found, [[0, 1.2], [0, 1], [0, 1], [-0.3, 1]])
-    assert "widened to poses beyond them: jaw 0..1.2, brow -0.3..1" in caplog.text
+    np.testing.assert_allclose(found, [[0, 1.2], [0, 1], [-0.2, 1], [-0.3, 1]])
+    assert "widened to poses beyond them: jaw 0..1.2, smile_R -0.2..1, brow -0.3..1" in caplog.text
     stated = with_limits(take, parse_limits(["0..1"])).controls.limits
     assert stated.tolist() == [[0, 1]] * 4
 
@@ -94,6 +94,10 @@ def test_a_model_of_controls_without_limits_is_read_again(make_take, tmp_path) -
     np.testing.assert_array_equal(again.controls.limits, take.controls.limits)
     poses = np.vstack([take.params[take.labels], take.animation])
     assert again.bounds[0].tolist() == [poses[:, 0].min(), poses[:, 0].max()]
-    assert again.bounds[1].tolist() == [-9, 9]
+    assert again.bounds[1, 1] > poses[:, 1].max()
+    free = train(take, Settings(method="nearest", limits="declared"))
+    free.save(tmp_path / "free.safetensors")
+    free = load(tmp_path / "free.safetensors")
+    assert free.bounds[:2].tolist() == [list(UNLIMITED), [-9, 9]]
     facts = json.dumps(facts_of(take), allow_nan=False)
     assert "[null, null], [-9.0, 9.0]" in facts
