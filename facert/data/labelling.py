@@ -62,11 +62,16 @@ def labelled(take: Take, poses: Poses) -> Take:
     """The take with these poses as labels, beside those that it has.
 
     By time, a pose belongs to the nearest frame, half a nominal frame away at most. Where the take
-    has a pose already, the new one counts; deviations of predicted poses are dropped.
+    has a pose already, the new one counts; poses that a model predicted are left out, and the log
+    counts them.
 
     Raises `InputError` for a pose without a frame, two for one frame, no pose at all, or a take
     whose controls are others.
     """
+    predicted = predicted_poses(take)
+    if predicted:
+        log.info("%s that a model predicted: left out", plural(predicted, "pose"))
+        take = without_predicted(take)
     frames, controls, values = placed(take, poses)
     params = np.full((len(take), len(controls.names)), np.nan)
     if take.params is not None and len(take.labels):
@@ -93,17 +98,23 @@ def of_character(take: Take, controls: Controls) -> Take:
     if take.controls is None or take.controls.names == controls.names:
         return take if take.controls is None else replace(take, controls=controls)
     places = _places(take.controls.names, controls, "/target/names")
-    params, std, animation = (
-        None if values is None else _spread(values, places, len(controls.names))
-        for values in (take.params, take.std, take.animation)
-    )
+
+    def spread(values: FloatArray | None) -> FloatArray | None:
+        return None if values is None else _spread(values, places, len(controls.names))
+
+    params, std, animation = map(spread, (take.params, take.std, take.animation))
+    corrections = take.corrections
+    if corrections is not None:
+        corrected = _spread(corrections.params, places, len(controls.names))
+        predicted, deviations = map(spread, (corrections.predicted, corrections.std))
+        corrections = replace(corrections, params=corrected, predicted=predicted, std=deviations)
     return replace(
         take,
         controls=controls,
         params=params,
         std=std,
         animation=animation,
-        corrections=None,
+        corrections=corrections,
     )
 
 

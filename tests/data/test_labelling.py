@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facert.data.labelling import Poses, labelled, poses_of, weights_as_poses
+from facert.data.corrections import put_in, taken_out
+from facert.data.labelling import Poses, labelled, of_character, poses_of, weights_as_poses
 from facert.data.rig import Rig
-from facert.data.take import Source, Take
+from facert.data.take import Controls, Corrections, Source, Take
 from facert.errors import InputError
 
 TAKE = Take(np.arange(10) / 30, Source(np.ones((10, 1, 3)), ("m",)), fps=30.0)
@@ -122,3 +123,20 @@ def test_numbers_and_times_that_name_other_frames_are_warned_of(
     labelled(take, replace(poses, time=100 + kept[[2, 8, 12]] / 30))
     labelled(take, replace(poses, time=np.array([7.0, 8.0, 12.0])))  # another clock's
     assert not caplog.text
+
+
+def test_poses_that_a_model_predicted_are_left_out_of_the_labels(caplog) -> None:
+    caplog.set_level("INFO", "facert")
+    first = labelled(TAKE, numbered(1, 2, 5))
+    std = np.where(np.arange(10)[:, None] == 2, np.nan, 0.1) * np.ones(2)
+    result = replace(first, std=std)
+    assert labelled(result, numbered(7)).labels.tolist() == [2, 7]
+    assert "2 poses that a model predicted: left out" in caplog.text
+
+
+def test_a_corrected_take_gets_the_controls_of_its_character() -> None:
+    whole = labelled(TAKE, Poses(NAMES, np.full((10, 2), 0.5), frames=np.arange(10)))
+    corrected = put_in(whole, Corrections(np.array([3]), np.array([[0.9, 0.1]]), np.array([0.2])))
+    found = of_character(corrected, Controls(("smile_L", "brow", "jaw"), None))
+    assert found.params[3].tolist() == [0.1, 0, 0.9]
+    assert taken_out(found).params[3].tolist() == [0.5, 0, 0.5]
