@@ -185,16 +185,18 @@ def test_what_lies_beside_a_document_comes_into_the_file(builder, tmp_path) -> N
     for view in root["bufferViews"][2:]:
         view.update(buffer=1, byteOffset=view["byteOffset"] - half)
     names = ["textures/skin%20a.png", "textures/secret.png", "../above.png", "link.png", "gone.png"]
+    names += ["./textures/skin a.png"]
     root["images"] = [{"uri": name} for name in names]
     (folder / "face.gltf").write_text(json.dumps(root))
     document = written(folder / "face.gltf", tmp_path / "out.glb")
     old = views(plain.root, plain.buffers())
     assert views(document.root, document.buffers)[: len(old)] == old
     assert len(document.root["buffers"]) == 1
-    embedded, *others = document.root["images"]
+    embedded, *others, again = document.root["images"]
+    assert again == embedded
     assert embedded["mimeType"] == "image/png"
     assert views(document.root, document.buffers)[embedded["bufferView"]] == picture
-    assert [one["uri"] for one in others] == names[1:]
+    assert [one["uri"] for one in others] == names[1:-1]
     assert b"key = 1" not in (tmp_path / "out.glb").read_bytes()
     np.testing.assert_allclose(
         read_gltf_rig(tmp_path / "out.glb").shapes, read_gltf_rig(tmp_path / "plain.glb").shapes
@@ -241,6 +243,15 @@ def test_a_damaged_file_is_refused(builder, tmp_path, change, message) -> None:
     (tmp_path / "bad.glb").write_bytes(glb(plain.root | change, plain.buffers()[0]))
     with pytest.raises(InputError, match=message):
         Character(tmp_path / "bad.glb")
+
+
+@pytest.mark.parametrize("wrong", [5, [{}], [{"channels": [{"sampler": 0, "target": {}}]}]])
+def test_a_damaged_animation_is_refused(builder, tmp_path, wrong) -> None:
+    plain = read_container(builder.save(tmp_path / "plain.glb"))
+    (tmp_path / "bad.glb").write_bytes(glb(plain.root | {"animations": wrong}, plain.own or b""))
+    with pytest.raises(InputError, match=r"valid glTF 2\.0, found damaged data"):
+        written(tmp_path / "bad.glb", tmp_path / "out.glb")
+    assert not (tmp_path / "out.glb").exists()
 
 
 @pytest.mark.parametrize(

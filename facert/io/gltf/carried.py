@@ -80,32 +80,45 @@ class CarriedFile:
                     place["byteOffset"] = begin + place.get("byteOffset", 0)
 
     def _embed_pictures(self, folder: Path) -> None:
-        """Bring pictures beside the document into the buffer; name those that cannot be."""
-        outside = []
+        """Bring pictures beside the document into the buffer, each once; name those left outside."""
+        outside: list[str] = []
+        held: dict[Path, dict[str, Any]] = {}
         for image in self.root.get("images", []):
             uri = image.get("uri")
             if not isinstance(uri, str) or uri.startswith("data:"):
                 continue
-            found = _picture(folder, uri)
-            if found is None:
+            path = _path_within(folder, uri)
+            found = None if path is None else held.get(path) or self._embedded(path)
+            if path is None or found is None:
                 outside.append(uri)
                 continue
-            content, image["mimeType"] = found
+            held[path] = found
             del image["uri"]
-            image["bufferView"] = self.buffer.view(content)
+            image |= found
         if outside:
             names = printable(", ".join(outside), 200)
             log.warning("pictures that are not in the character's folder stay outside: %s", names)
 
+    def _embedded(self, path: Path) -> dict[str, Any] | None:
+        """What an image says that has come into the buffer; None where it is no picture."""
+        found = _picture(path)
+        if found is None:
+            return None
+        content, kind = found
+        return {"mimeType": kind, "bufferView": self.buffer.view(content)}
 
-def _picture(folder: Path, uri: str) -> tuple[bytes, str] | None:
-    """A picture in the folder or below it, and its kind; None for anything else."""
+
+def _path_within(folder: Path, uri: str) -> Path | None:
+    """A file in the folder or below it; None for anything else."""
     name = unquote(uri)
     if "\\" in name or ":" in name or "\0" in name:
         return None
     path = (folder / name).resolve()
-    if not path.is_relative_to(folder.resolve()) or not path.is_file():
-        return None
+    return path if path.is_relative_to(folder.resolve()) and path.is_file() else None
+
+
+def _picture(path: Path) -> tuple[bytes, str] | None:
+    """The bytes of a picture, and its kind; None for anything else."""
     try:
         content = moderate_file(path).read_bytes()
     except InputError:

@@ -123,11 +123,12 @@ class Character:
             require_used(self._drivers.controls, controls)
         drivers = shape_drivers(controls, self.names)
         channels = self._channels(params[posed] @ drivers, np.asarray(drivers.any(axis=0)))
-        if len(time[posed]) > 1:
-            self._replace_others(channels)
-            self._animate(channels, time[posed] - time[posed][0], path.stem)
-        else:
-            self._pose(channels)
+        with parsing("file", "valid glTF 2.0"):
+            if len(time[posed]) > 1:
+                self._replace_others(channels)
+                self._animate(channels, time[posed] - time[posed][0], path.stem)
+            else:
+                self._pose(channels)
         self._file.write(path, overwrite)
         self._log(controls, params[posed], channels)
         frames, count = plural(int(posed.sum()), "frame"), plural(len(controls), "control")
