@@ -80,7 +80,7 @@ class CarriedFile:
                     place["byteOffset"] = begin + place.get("byteOffset", 0)
 
     def _embed_pictures(self, folder: Path) -> None:
-        """Bring pictures beside the document into the buffer, each once; name those left outside."""
+        """Bring pictures beside the document into the buffer, each once; name all others."""
         outside: list[str] = []
         held: dict[Path, dict[str, Any]] = {}
         for image in self.root.get("images", []):
