@@ -25,10 +25,15 @@ _SCRIPT = """
   window.facertKeys = true;
   const typed = (e) => e.matches('input, textarea');
   const page = document.documentElement;
-  document.addEventListener('pointerup', (event) => setTimeout(() => {
-    const e = document.activeElement;
-    if (e && (!typed(e) || event.target.closest('[role=option]'))) e.blur();
-  }));
+  document.addEventListener('pointerup', (event) => {
+    const chosen = event.target.closest('[role=option]');  // its list takes the focus once more
+    const release = () => {
+      const e = document.activeElement;
+      if (e && (chosen || !typed(e))) e.blur();
+    };
+    setTimeout(release);
+    if (chosen) setTimeout(release, 300);
+  });
   document.body.addEventListener('keydown', (event) => {
     if (event.key === 'Enter' && typed(event.target)) setTimeout(() => event.target.blur());
     const focused = event.target.closest('button, [role=slider], [role=tab]');

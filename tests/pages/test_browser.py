@@ -219,6 +219,8 @@ def test_two_takes_one_of_them_a_result_are_corrected_and_trained_on(
         seen.page.get_by_role("combobox", name="take").click()
         seen.page.get_by_role("option", name="<b>.h5").click()
         assert seen.until(lambda: session.here == 1)
+        seen.page.wait_for_timeout(400)
+        assert seen.until(lambda: seen.page.evaluate("document.activeElement.tagName") == "BODY")
         seen.page.keyboard.press("Shift+ArrowRight")
         assert seen.until(lambda: page.playback.frame == 10)
         seen.slide("jaw_open", 0.9)
