@@ -77,7 +77,7 @@ def labelled(take: Take, poses: Poses) -> Take:
     if take.params is not None and len(take.labels):
         params[:] = take.params
     params[frames] = values
-    return replace(take, controls=controls, params=params, std=None, corrections=None)
+    return take.with_poses(controls, params)
 
 
 def placed(take: Take, poses: Poses) -> tuple[IntArray, Controls, FloatArray]:
@@ -291,20 +291,19 @@ def weights_as_poses(take: Take, rig: Shaped) -> Take:
         raise InputError("/source/weights", "a whole frame", found, "Fill them: facert clean.")
     controls = Controls(tuple(poses.names[i] for i in kept))
     params = np.where(whole[:, None], values, np.nan)
-    return replace(
-        take, controls=controls, params=params, std=None, animation=None, corrections=None
-    )
+    return replace(take.with_poses(controls, params), animation=None)
 
 
 def predicted_frames(take: Take) -> IntArray:
     """The posed frames whose pose a model predicted: it has a standard deviation.
 
-    Of a result with corrections these are all others, whether the method had deviations or not.
+    Of a result that names its model, and of one with corrections, these are all that nobody
+    corrected, whether the method had deviations or not.
     """
     if take.corrections is not None:
         return np.setdiff1d(take.labels, take.corrections.frames)
     if take.std is None:
-        return np.empty(0, dtype=np.int64)
+        return take.labels if take.model else take.labels[:0]
     return take.labels[(take.std[take.labels] > 0).any(axis=1)]
 
 
@@ -320,4 +319,4 @@ def without_predicted(take: Take) -> Take:
         return take
     params = take.params.copy()
     params[frames] = np.nan
-    return replace(take, params=params, std=None, corrections=None)
+    return take.with_poses(take.controls, params)

@@ -88,8 +88,8 @@ class Named(NamedTuple):
 
 def without_poses(take: Take) -> Take:
     """What was recorded, alone."""
-    nothing = replace(take, params=None, std=None, animation=None, corrections=None)
-    return replace(nothing, controls=None)
+    bare = replace(take, animation=None).with_poses(take.controls, None)
+    return replace(bare, controls=None)
 
 
 def _numbered(noun: str, count: int) -> tuple[str, ...]:
@@ -249,7 +249,7 @@ def _reach(one: Named, controls: Controls) -> FloatArray:
 def _with_controls(part: Take, name: str, controls: Controls) -> Take:
     """A take with its poses in the order of the controls."""
     if not _has_poses(part):
-        return replace(part, controls=controls, params=None, std=None, corrections=None)
+        return part.with_poses(controls, None)
     assert part.controls is not None  # it has poses
     own = part.controls.names
     if own == controls.names and part.controls.limits is controls.limits:

@@ -301,6 +301,10 @@ class Take:
         """Number of frames T."""
         return len(self.time)
 
+    def with_poses(self, controls: Controls | None, params: FloatArray | None) -> Take:
+        """The take with these poses, (T, P), that somebody set, in place of those that it has."""
+        return replace(self, controls=controls, params=params, std=None, corrections=None, model="")
+
     @property
     def labels(self) -> IntArray:
         """Indices of the frames whose pose is known."""

@@ -109,7 +109,7 @@ def _set_by_somebody(take: Take, path: Path) -> Take:
     """
     predicted = predicted_poses(take)
     if predicted and predicted == len(take.labels):
-        found = f"a standard deviation for all {predicted}: a model predicted them"
+        found = f"a model predicted all {predicted} of them"
         fix = (
             "Give the poses that were set; to take these nonetheless, make a table of them first: "
         )

@@ -137,7 +137,7 @@ def check_poses(take: Take) -> None:
         raise _all_predicted(predicted)
     if predicted:
         log.warning(
-            "%s with a standard deviation: predicted, and not learned from, but the other %d are",
+            "%s predicted by a model, and not learned from, but the other %d are",
             *(plural(predicted, "pose"), len(take.labels) - predicted),
         )
 
@@ -146,9 +146,9 @@ def _all_predicted(count: int) -> InputError:
     return InputError(
         "/target/std",
         "poses that somebody set",
-        f"a standard deviation for all {count}: a model predicted them",
-        "Give the take that was posed; --allow-predicted (in Python a take with std=None) "
-        "learns from these nonetheless.",
+        f"a model predicted all {count} of them",
+        "Give the take that was posed; --allow-predicted (in Python "
+        "take.with_poses(take.controls, take.params)) learns from these nonetheless.",
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from facert.data.labelling import Poses, labelled
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.retarget.training import check_poses, train
@@ -21,7 +22,7 @@ def _predicted(make_take):
 
 
 def test_a_result_is_not_learned_from(predicted) -> None:
-    with pytest.raises(InputError, match=r"/target/std: .* for all 60: a model predicted them"):
+    with pytest.raises(InputError, match=r"/target/std: .* a model predicted all 60 of them"):
         check_poses(predicted)
     check_poses(replace(predicted, std=None))
 
@@ -31,7 +32,7 @@ def test_a_few_predicted_poses_among_labels_are_warned_about(predicted, caplog) 
     std[::2] = np.nan  # set by somebody
     std[1] = 0.0  # given exactly
     check_poses(replace(predicted, std=std))
-    assert "29 poses with a standard deviation" in caplog.text
+    assert "29 poses predicted by a model" in caplog.text
     caplog.clear()
     check_poses(replace(predicted, std=np.zeros_like(std)))
     assert not caplog.records
@@ -124,3 +125,13 @@ def test_poses_of_real_recordings_are_not_absurd(real_data, name, target, caplog
         for seed in range(3):
             rows = np.random.default_rng(seed).permutation(len(values))[:count]
             assert not warned(posed(values[rows]), caplog)
+
+
+def test_poses_of_a_named_model_are_predicted_without_deviations_too(predicted) -> None:
+    result = replace(predicted, std=None, model="svr.safetensors: svr, 40 poses")
+    with pytest.raises(InputError, match="a model predicted all 60"):
+        check_poses(result)
+    poses = Poses(result.controls.names, result.params[[7]], frames=np.array([7]))
+    posed = labelled(result, poses)
+    assert posed.labels.tolist() == [7]
+    check_poses(posed)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +50,7 @@ def read_takes(
         for path, key in zip(paths, keys, strict=False)
     ]
     if predicted:
-        takes = [replace(take, std=None, corrections=None) for take in takes]
+        takes = [take.with_poses(take.controls, take.params) for take in takes]
     old = zip(animation, keys[len(paths) :], strict=True)
     poses = [read_animation(path, key) for path, key in old]
     with reading(listed_files(paths)):
