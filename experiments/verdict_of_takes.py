@@ -167,15 +167,15 @@ class Judged:
 
     @property
     def amount(self) -> float:
-        """How much the take is doubted, RMS."""
-        return rms(self.verdict.doubt)
+        """How anomalous the take is, RMS."""
+        return rms(self.verdict.anomaly)
 
     def stretches(self) -> Iterator[tuple[float, float]]:
-        """Error and doubt of each stretch of the take."""
+        """Error and anomaly of each stretch of the take."""
         step = max(1, round(STRETCH * (len(self.error) - 1) / np.ptp(self.verdict.time)))
         for start in range(0, len(self.error), step):
             part = slice(start, start + step)
-            yield rms(self.error[part]), rms(self.verdict.doubt[part])
+            yield rms(self.error[part]), rms(self.verdict.anomaly[part])
 
 
 def with_values(take: Take, values: FloatArray) -> Take:
@@ -250,7 +250,7 @@ def row(case: str, found: list[Judged]) -> tuple[str, ...]:
 
 
 def summary(found: list[Judged]) -> list[str]:
-    """Rank correlations of doubt and error."""
+    """Rank correlations of anomaly and error."""
     takes = spearmanr([one.rms for one in found], [one.amount for one in found]).statistic
     levels = [LEVELS.index(one.verdict.level) for one in found]
     by_level = spearmanr([one.rms for one in found], levels).statistic
@@ -259,8 +259,8 @@ def summary(found: list[Judged]) -> list[str]:
     within = [spearmanr(*np.array(list(one.stretches())).T).statistic for one in found]
     return [
         f"Rank correlation with the true error, over {len(found)} takes: {takes:.2f} of the "
-        f"doubt, {by_level:.2f} of the level; over {len(parts)} stretches of two seconds "
-        f"{stretches:.2f} of the doubt, within a take {np.nanmedian(within):.2f} (median)."
+        f"anomaly, {by_level:.2f} of the level; over {len(parts)} stretches of two seconds "
+        f"{stretches:.2f} of the anomaly, within a take {np.nanmedian(within):.2f} (median)."
     ]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.labelling import predicted_poses
+from facert.data.limits import known_poses_of
 from facert.data.names import NameIndex, match, nearest
 from facert.data.subject import about
 from facert.data.take import Controls, Source, Take, named_curves
@@ -27,6 +28,8 @@ log = logging.getLogger("facert")
 
 LEAST_SHARED = 0.5
 """Takes share at least so much of the smaller one's markers or weights; else it is another set."""
+FAR_MORE, PERCENT = 20.0, 10.0
+"""Poses are in another unit that go so many times as far as others; shares do not go so far."""
 ABSENT = 0.5
 """Controls that an animation may lack, as a share: those that it never moves."""
 
@@ -73,9 +76,11 @@ def as_takes(
         return Takes(tuple(parts), names)
     parts = [_with_controls(*one, controls) for one in zip(parts, names, strict=True)]
     rows = [part.animation for part in parts if part.animation is not None]
+    known = np.vstack([known_poses_of(part) for part in parts])
     for one in poses:
         with about(one.name):
             rows.append(_animation(one, controls))
+            _warn_of_scale(rows[-1], known)
     return Takes(tuple(parts), names, np.concatenate(rows) if rows else None)
 
 
@@ -102,7 +107,8 @@ def _has_poses(take: Take) -> bool:
 
 def _with_sources_of_one(parts: Sequence[Take], names: Sequence[str]) -> list[Take]:
     """Takes with the unit and the up axis of the first, and the names of all."""
-    first = parts[0]
+    units = next((part.units for part in parts if part.units), "")
+    first = _in_units(parts[0], names[0], units)
     for part, name in zip(parts[1:], names[1:], strict=True):
         if part.source.kind != first.source.kind:
             expected, found = f"{first.source.kind}, as {names[0]} has", part.source.kind
@@ -121,19 +127,25 @@ def _rest(parts: Sequence[Take], names: Sequence[str]) -> list[tuple[Take, str]]
 
 def _converted(part: Take, name: str, first: Take) -> Take:
     """A take with markers in the unit and the axes of the first."""
-    if part.source.kind == "weights":
-        return part
-    found = part
+    found = _in_units(part, name, first.units)
+    if part.source.kind == "weights" or not first.up_axis or not part.up_axis:
+        return found
     with about(name):
-        if first.units and part.units != first.units:
-            wanted = checked_unit(first.units, "units of the first take")
-            found = _take(with_units(found, wanted), first.units)
-            if part.units:
-                log.info("%s: converted from %s to %s", name, part.units, wanted)
-        if first.up_axis and part.up_axis and part.up_axis != first.up_axis:
-            log.info("%s: turned so that %s points up", name, first.up_axis)
+        if part.up_axis != first.up_axis:
+            log.info("turned so that %s points up", first.up_axis)
             found = _take(with_up_axis(found, first.up_axis, part.up_axis), found.units)
     return found
+
+
+def _in_units(part: Take, name: str, units: str) -> Take:
+    """A take with markers in a unit; one that states none is taken to be in it."""
+    if part.source.kind == "weights" or part.units == units:
+        return part
+    with about(name):
+        wanted = checked_unit(units, "units of the takes")
+        if part.units:
+            log.info("converted from %s to %s", part.units, wanted)
+        return _take(with_units(part, wanted), units)
 
 
 def _take(found: object, units: str) -> Take:
@@ -276,9 +288,9 @@ def _with_controls(part: Take, name: str, controls: Controls) -> Take:
 
 
 def _animation(one: Named, controls: Controls) -> FloatArray:
-    """The poses of a take for these controls, (n, P); those that it lacks are at rest, told."""
+    """The poses of a take for these controls, (n, P); those that it lacks are at rest."""
     if predicted_poses(one.take):
-        log.info("%s: a model predicted its poses: taken for animation as they are", one.name)
+        log.info("a model predicted its poses: taken for animation as they are")
     names, poses = _poses_without_frames(one)
     index = NameIndex.among(names, controls.names, "names of the animation")
     places = [index.find(control) for control in controls.names]
@@ -288,11 +300,11 @@ def _animation(one: Named, controls: Controls) -> FloatArray:
         index.places(absent, "names of the animation")  # names which, and the nearest name
     if absent:
         what = ", ".join(map(repr, absent))
-        log.warning("%s: taken to be at 0 throughout, as it lacks them: %s", one.name, what)
+        log.warning("taken to be at 0 throughout, as it lacks them: %s", what)
     if extra:
         controls_ = plural(len(extra), "control")
-        text = "%s: %s that the takes do not have, passed over (%s)"
-        log.info(text, one.name, controls_, listed([repr(name) for name in extra]))
+        text = "%s that the takes do not have, passed over (%s)"
+        log.info(text, controls_, listed([repr(name) for name in extra]))
     found = np.zeros((len(poses), len(places)))
     for column, place in enumerate(places):
         if place is not None:
@@ -300,8 +312,25 @@ def _animation(one: Named, controls: Controls) -> FloatArray:
     whole = ~np.isnan(found).any(axis=1)
     if not whole.any():
         raise InputError("the animation", "whole poses", "gaps in every one", "Fill them.")
-    log.info("%s: %s of old animation", one.name, plural(int(whole.sum()), "pose"))
+    log.info("%s of old animation", plural(int(whole.sum()), "pose"))
     return found[whole]
+
+
+def _warn_of_scale(animation: FloatArray, known: FloatArray) -> None:
+    """Warn of animation (n, P) in percent beside known poses (l, P) in shares, or the reverse."""
+    if not len(known):
+        return
+    reach = np.stack([np.abs(poses).max(axis=0) for poses in (animation, known)])
+    reach = reach[:, (reach > 0.0).all(axis=0)]
+    if not reach.size:
+        return
+    ratio, (_, usual) = float(np.median(reach[0] / reach[1])), np.median(reach, axis=1)
+    if ratio > FAR_MORE:
+        text = "its poses go about %.2g times as far as those of the takes: percent instead of "
+        log.warning(text + "fractions? Divide them by 100", ratio)
+    elif ratio * FAR_MORE < 1.0 and usual > PERCENT:
+        text = "its poses go about %.2g times as far as those of the takes: fractions instead of "
+        log.warning(text + "percent? Multiply them by 100", ratio)
 
 
 def _poses_without_frames(one: Named) -> tuple[Sequence[str], FloatArray]:

@@ -7,15 +7,19 @@ other, for all that looks at frames one by one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.take import Take
+from facert.data.text import plural
+
+log = logging.getLogger("facert")
 
 PAUSE = 1.0
 """Seconds between two takes where their frames stand one after the other."""
@@ -115,6 +119,31 @@ class Takes:
         return np.concatenate(
             [np.tile(none, (len(part), 1)) if one is None else one for part, one in rows]
         )
+
+
+def same_recordings(takes: Takes) -> Iterator[tuple[int, int]]:
+    """Each two takes with the very same frames, as a recording and its corrected result have."""
+    for one, other in combinations(range(len(takes.parts)), 2):
+        first, second = (takes.parts[place].source.values for place in (one, other))
+        if np.array_equal(first, second, equal_nan=True):
+            yield one, other
+
+
+def posed_once(takes: Takes) -> Takes:
+    """The takes with one pose for each frame of a recording: that of the last take of it."""
+    parts = list(takes.parts)
+    for one, other in same_recordings(takes):
+        both = np.intersect1d(parts[one].labels, parts[other].labels)
+        params = parts[one].params
+        if params is None or not len(both):
+            continue
+        params = params.copy()
+        params[both] = np.nan
+        parts[one] = replace(parts[one], params=params, corrections=None)
+        text = "%s and %s are of the same recording: of %s posed in both, the poses of %s count"
+        names = takes.names[one], takes.names[other]
+        log.warning(text, *names, plural(len(both), "frame"), names[1])
+    return takes.with_parts(parts)
 
 
 def separated(parts: Sequence[FloatArray]) -> FloatArray:

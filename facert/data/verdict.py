@@ -61,18 +61,18 @@ class Verdict:
     ----------
     reasons : tuple of Reason
         The worst first.
-    doubt : array, shape (T,)
-        How much each frame is to be doubted, to find the worst ones: beside other frames only.
+    anomaly : array, shape (T,)
+        How anomalous each frame is, to find the worst ones: beside other frames only.
     time : array, shape (T,)
         Seconds of the frames.
     """
 
     reasons: tuple[Reason, ...]
-    doubt: FloatArray
+    anomaly: FloatArray
     time: FloatArray
 
     def __post_init__(self) -> None:
-        frozen(self.doubt)
+        frozen(self.anomaly)
 
     @property
     def level(self) -> Level:
@@ -82,8 +82,8 @@ class Verdict:
     def worst(self, count: int) -> IntArray:
         """The frames to look at first, at most so many, apart in time; in order of time."""
         chosen: list[int] = []
-        for frame in np.argsort(-self.doubt, kind="stable"):
-            if len(chosen) == count or self.doubt[frame] <= 0.0:
+        for frame in np.argsort(-self.anomaly, kind="stable"):
+            if len(chosen) == count or self.anomaly[frame] <= 0.0:
                 break
             if all(abs(self.time[frame] - self.time[other]) >= APART for other in chosen):
                 chosen.append(int(frame))

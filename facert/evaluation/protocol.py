@@ -21,7 +21,7 @@ from facert.data.normalisation import Normalisation
 from facert.data.rig import Rig
 from facert.data.subject import about
 from facert.data.take import Controls, Take
-from facert.data.takes import Takes
+from facert.data.takes import Takes, same_recordings
 from facert.data.text import plural
 from facert.errors import InputError, reading
 from facert.evaluation.metrics import vertex_gram
@@ -151,6 +151,7 @@ def make_problem(
     for part, name in takes.named:
         with about(name):
             _check_true(part)
+    _check_different(takes)
     given = takes.joined
     _check_posed(given)
     assert given.controls is not None  # poses come with controls
@@ -305,6 +306,13 @@ def _check_true(take: Take) -> None:
     if predicted:
         found = f"{plural(predicted, 'pose')} that a model predicted"
         raise InputError("/target/std", "true poses", found, "Give the take that was posed.")
+
+
+def _check_different(takes: Takes) -> None:
+    """Refuse a recording that is given twice: what is tested on would be learned from."""
+    for one, other in same_recordings(takes):
+        found = f"{takes.names[one]} and {takes.names[other]} with the very same frames"
+        raise InputError("takes", "different recordings", found, "Give each of them once.")
 
 
 def _too_short(labels: int, unlabelled: int, problem: Problem, posed: int) -> InputError:

@@ -1,7 +1,7 @@
 """Verdicts in take files: beside a result, for who shows it later.
 
 ========================  ===============  =====================================================
-``/verdict/doubt``        (T,)             how much each frame is to be doubted
+``/verdict/anomaly``      (T,)             how anomalous each frame is
 ``/verdict/reasons``      (r, T) bool      where each reason is
 ``/verdict/kinds``        (r,)             UTF-8: what each is about; likewise ``levels``,
                                            ``texts`` and ``cures``
@@ -29,11 +29,11 @@ _WORDS = ("kind", "level", "text", "cure")
 def beside_result(verdict: Verdict) -> Beside:
     """What `facert.io.take.write_take` is to write beside a result."""
     reasons = verdict.reasons
-    frames = np.arange(len(verdict.doubt))
+    frames = np.arange(len(verdict.anomaly))
     words = {f"/verdict/{word}s": tuple(getattr(r, word) for r in reasons) for word in _WORDS}
     masks = [np.isin(frames, reason.frames) for reason in reasons]
     where = np.array(masks, dtype=np.bool_).reshape(len(reasons), len(frames))
-    return {"/verdict/doubt": verdict.doubt, "/verdict/reasons": where, **words}
+    return {"/verdict/anomaly": verdict.anomaly, "/verdict/reasons": where, **words}
 
 
 def read_verdict(path: Path) -> Verdict | None:
@@ -47,14 +47,14 @@ def read_verdict(path: Path) -> Verdict | None:
     if stated_format(path) != TAKE_FORMAT:
         return None
     with open_guarded(path) as file:
-        return _read(file) if "/verdict/doubt" in file else None
+        return _read(file) if "/verdict/anomaly" in file else None
 
 
 def _read(file: GuardedFile) -> Verdict:
-    time, doubt = file.numbers("/time"), file.numbers("/verdict/doubt")
+    time, anomaly = file.numbers("/time"), file.numbers("/verdict/anomaly")
     where = file.flags("/verdict/reasons")
-    require_shape(doubt.shape, time.shape, "/verdict/doubt", _FIX)
-    require_finite(doubt, "/verdict/doubt", _FIX)
+    require_shape(anomaly.shape, time.shape, "/verdict/anomaly", _FIX)
+    require_finite(anomaly, "/verdict/anomaly", _FIX)
     words = [file.names(f"/verdict/{word}s") for word in _WORDS]
     for word, found in zip(_WORDS, words, strict=True):
         require_shape((len(found),), where.shape[:1], f"/verdict/{word}s", _FIX)
@@ -67,4 +67,4 @@ def _read(file: GuardedFile) -> Verdict:
         Reason(kind, next(one for one in LEVELS if one == level), text, cure, np.flatnonzero(mask))
         for kind, level, text, cure, mask in rows
     )
-    return Verdict(reasons, doubt, time)
+    return Verdict(reasons, anomaly, time)

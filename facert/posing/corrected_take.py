@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.data.corrections import WIDTH, merged, put_in, taken_out
 from facert.data.names import match
 from facert.data.take import Controls, Corrections, Take
@@ -67,7 +67,7 @@ def correct_take(
     require_result(result)
     if not poses:
         raise InputError("frames", "one to correct", "none", "Name a frame and its controls.")
-    frames = np.array(sorted(poses), dtype=np.int64)
+    frames = _frame_numbers(poses)
     outside = frames[(frames < 0) | (frames >= len(result))]
     if len(outside):
         expected = f"0 to {len(result) - 1}"
@@ -75,6 +75,15 @@ def correct_take(
     wanted = [_pose(result, int(frame), poses[frame], character, hold, only) for frame in frames]
     made = Corrections(frames, np.array(wanted), np.full(len(frames), width))
     return put_in(result, merged(result.corrections, made))
+
+
+def _frame_numbers(poses: Mapping[int, Mapping[str, float] | ArrayLike]) -> IntArray:
+    """The numbers of the frames, (c,), rising."""
+    numbers = np.array(sorted(poses))
+    if numbers.dtype.kind not in "iu":
+        expected, found = "whole numbers of frames", f"{numbers[0]!r}"
+        raise InputError("frame", expected, found, "Count frames from 0.")
+    return numbers.astype(np.int64)
 
 
 def require_result(take: Take) -> None:

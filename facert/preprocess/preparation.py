@@ -35,7 +35,8 @@ from facert.settings import Settings
 log = logging.getLogger(__name__)
 
 APART = 1.0
-"""Takes are far apart when most numbers are so many standard deviations of the largest motion."""
+"""Takes are far apart when most numbers are so many standard deviations of the largest motion
+within a take."""
 LEFT = 0.3
 """This share of the noise is left in the frames that are learned from. It holds a method back from
 reading much into motion as small as the noise, which would not hold for expressions that no label
@@ -127,7 +128,7 @@ def prepare(given: Take | Takes, settings: Settings) -> Prepared:
     posed = observed.posed
     measured = posed.joined.source
     units = Normalisation.of(measured.matrix, f"/source/{measured.kind}")
-    _warn_of_distance(observed, units)
+    _warn_of_distance(observed)
     cleaned = [_cleaned(part, name, settings) for part, name in observed.named]
     estimate = _of_all(observed, [found for _, found in cleaned], units)
     clean = observed.with_parts([part for part, _ in cleaned])
@@ -213,11 +214,14 @@ def _observed_part(takes: Takes) -> Takes:
     )
 
 
-def _warn_of_distance(takes: Takes, units: Normalisation) -> None:
+def _warn_of_distance(takes: Takes) -> None:
     """Warn of takes that lie far from the first: by their unit, or as the head stands elsewhere."""
-    first, *others = (_centre(units.apply(part.source.matrix)) for part in takes.parts)
-    for name, centre in zip(takes.names[1:], others, strict=True):
-        away = float(np.nanmedian(np.abs(centre - first)))
+    if len(takes.parts) == 1:
+        return
+    matrices = [part.source.matrix for part in takes.parts]
+    first, *others = ((_centre(X), _largest_motion(X)) for X in matrices)
+    for name, (centre, motion) in zip(takes.names[1:], others, strict=True):
+        away = float(np.nanmedian(np.abs(centre - first[0]))) / max(first[1], motion)
         if away > APART:
             log.warning(
                 "%s lies far from %s, most of it %.2g times as far as the face moves: another "
@@ -231,6 +235,13 @@ def _centre(X: FloatArray) -> FloatArray:
     seen = ~np.isnan(X)
     total = np.where(seen, X, 0.0).sum(axis=0)
     return np.where(seen.any(axis=0), total / np.maximum(seen.sum(axis=0), 1), np.nan)
+
+
+def _largest_motion(X: FloatArray) -> float:
+    """The largest standard deviation of a column of X (T, d)."""
+    shown = X[:, ~np.isnan(X).all(axis=0)]
+    tiny = float(np.finfo(np.float64).tiny)
+    return max(float(np.nanstd(shown, axis=0).max(initial=0.0)), tiny)
 
 
 def _warn_of_zeros(source: Source) -> None:

@@ -13,7 +13,7 @@ from facert.data.matching_takes import as_takes
 from facert.data.normalisation import Normalisation
 from facert.data.subject import about
 from facert.data.take import Take
-from facert.data.takes import Takes
+from facert.data.takes import Takes, posed_once
 from facert.data.text import plural
 from facert.errors import InputError
 from facert.methods.registry import method_class, require_known
@@ -100,7 +100,7 @@ def _posed_by_somebody(takes: Takes) -> Takes:
         check_poses(takes.parts[0])
     else:
         _warn_of_results(takes)
-    return takes.with_parts([without_predicted(part) for part in takes.parts])
+    return posed_once(takes.with_parts([without_predicted(part) for part in takes.parts]))
 
 
 def _warn_of_results(takes: Takes) -> None:

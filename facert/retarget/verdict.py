@@ -59,12 +59,14 @@ def judge(
         off[reason.frames] |= reason.kind in UNLIKE
     of_poses, unsure = pose_reasons(result, model, off)
     reasons = sorted([*of_source, *of_poses], key=lambda reason: -LEVELS.index(reason.level))
-    return Verdict(tuple(reasons), _doubt(reasons, unlike, unsure), result.time)
+    return Verdict(tuple(reasons), _anomaly(reasons, unlike, unsure), result.time)
 
 
-def _doubt(reasons: Sequence[Reason], unlike: FloatArray | None, unsure: FloatArray) -> FloatArray:
-    """How much each frame is to be doubted, (T,)."""
-    doubt = unsure.copy() if unlike is None else unsure + np.log1p(unlike)
+def _anomaly(
+    reasons: Sequence[Reason], unlike: FloatArray | None, unsure: FloatArray
+) -> FloatArray:
+    """How anomalous each frame is, (T,)."""
+    anomaly = unsure.copy() if unlike is None else unsure + np.log1p(unlike)
     for reason in reasons:
-        doubt[reason.frames] += LEVELS.index(reason.level)
-    return doubt
+        anomaly[reason.frames] += LEVELS.index(reason.level)
+    return anomaly

@@ -130,7 +130,7 @@ def test_old_animation_is_matched_by_name(first, caplog) -> None:
     old = weights(["Smile", "tongue", "jaw", "blink", "brow"], np.arange(15.0).reshape(3, 5))
     found = as_takes(first, old, animation_names=["old.glb"])
     np.testing.assert_array_equal(found.animation, old.source.values[:, [2, 0, 4, 3]])
-    assert "old.glb: 1 control that the takes do not have, passed over ('tongue')" in caplog.text
+    assert "1 control that the takes do not have, passed over ('tongue')" in caplog.text
     np.testing.assert_array_equal(found.joined.animation, found.animation)
 
 
@@ -140,7 +140,7 @@ def test_a_control_that_animation_lacks_is_at_rest_and_a_misspelt_one_an_error(
     values = np.ones((3, 3))
     found = as_takes(first, weights(["jaw", "smile", "brow"], values), animation_names=["old.csv"])
     np.testing.assert_array_equal(found.animation, [[1.0, 1.0, 1.0, 0.0]] * 3)
-    assert "old.csv: taken to be at 0 throughout, as it lacks them: 'blink'" in caplog.text
+    assert "taken to be at 0 throughout, as it lacks them: 'blink'" in caplog.text
     typo = weights(["jaw", "smile", "brow", "blnik"], np.ones((3, 4)))
     with pytest.raises(InputError, match=r"old\.csv: .*'blink'.*Did you mean 'blnik'"):
         as_takes(first, typo, animation_names=["old.csv"])
@@ -153,7 +153,7 @@ def test_poses_and_animation_of_old_takes_count_and_gaps_do_not(make_take, caplo
     gaps = weights(first.controls.names, [[1.0, np.nan, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]])
     found = as_takes(first, [predicted, gaps])
     assert len(found.animation) == 7 + 12 + 20 + 1
-    assert "animation 1: a model predicted its poses" in caplog.text
+    assert "a model predicted its poses" in caplog.text
 
 
 def test_takes_with_a_pose_are_those_to_learn_from(first, second) -> None:
@@ -162,3 +162,23 @@ def test_takes_with_a_pose_are_those_to_learn_from(first, second) -> None:
     assert takes.posed.names == ("b.h5",)
     assert as_takes([first, second]).posed.names == ("take 1", "take 2")
     assert isinstance(takes.posed, Takes)
+
+
+def test_a_first_take_without_a_unit_is_taken_to_be_in_that_of_the_others(first, second) -> None:
+    parts = as_takes([replace(first, units=""), replace(second, units="mm")]).parts
+    assert [part.units for part in parts] == ["mm", "mm"]
+
+
+@pytest.mark.parametrize(
+    ("poses", "old", "odd"), [(1, 100, True), (100, 1, True), (1, 1, False), (10, 1, False)]
+)
+def test_animation_in_percent_beside_shares_is_warned_of(first, caplog, poses, old, odd) -> None:
+    shares = np.random.default_rng(0).random((30, 4))
+    assert first.controls is not None
+    take = replace(
+        first, params=np.where(np.isnan(first.params), np.nan, poses * shares.max(axis=0))
+    )
+    as_takes(take, weights(first.controls.names, old * shares))
+    warned = [one.getMessage() for one in caplog.records if one.levelname == "WARNING"]
+    assert bool(warned) == odd
+    assert all("percent" in text for text in warned)

@@ -57,3 +57,9 @@ def test_one_of_the_takes_may_have_no_pose_and_none_predicted_ones(takes):
     predicted = replace(second, std=np.ones_like(second.params))
     with pytest.raises(InputError, match="take 2: /target/std: expected true poses"):
         make_problem([first, predicted], Protocol())
+
+
+def test_a_recording_that_is_given_twice_is_refused(takes):
+    """Its frames would be learned from and tested on."""
+    with pytest.raises(InputError, match="take 1 and take 3 with the very same frames"):
+        make_problem([*takes, takes[0]], Protocol())

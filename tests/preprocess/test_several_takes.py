@@ -140,3 +140,17 @@ def test_a_take_gives_frames_in_proportion_to_its_labels(make_take):
     chosen = choose_training_set(takes, Settings(unlabelled=None))
     assert len(chosen.X_labelled) == 30
     assert len(chosen.X_unlabelled) <= 60 + 20 + 5
+
+
+def test_a_take_in_another_unit_that_no_file_states_is_warned_of(make_take, caplog):
+    takes = [replace(make_take(frames=f, posed=8), units="") for f in (60, 45)]
+    far = [takes[0], replace(takes[1], source=takes[1].source.with_matrix(far_matrix(takes[1])))]
+    for given, warned in ((takes, False), (far, True)):
+        caplog.clear()
+        prepare(as_takes(given), Settings())
+        assert ("another unit" in caplog.text) == warned
+
+
+def far_matrix(take):
+    """A few markers far from the origin, as all are, in millimetres."""
+    return 10.0 * (take.source.matrix + np.linspace(0.0, 20.0, take.source.matrix.shape[1]))

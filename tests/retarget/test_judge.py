@@ -145,7 +145,7 @@ def test_a_verdict_is_kept_beside_the_result(model, shot, tmp_path):
     write_take(result, tmp_path / "r.h5", beside=beside_result(verdict))
     kept = read_verdict(tmp_path / "r.h5")
     assert [replace_frames(r) for r in kept.reasons] == [replace_frames(r) for r in verdict.reasons]
-    np.testing.assert_array_equal(kept.doubt, verdict.doubt)
+    np.testing.assert_array_equal(kept.anomaly, verdict.anomaly)
     assert facert.read_take(tmp_path / "r.h5").model == "ridge, 15 poses"
     write_take(result, tmp_path / "none.h5")
     assert read_verdict(tmp_path / "none.h5") is None
@@ -158,7 +158,7 @@ def replace_frames(reason):
 def test_a_damaged_verdict_is_refused(tmp_path):
     with create(tmp_path / "r.h5", "facert-take", 1, overwrite=False) as file:
         file.array("/time", np.arange(4.0))
-        file.array("/verdict/doubt", np.zeros(4))
+        file.array("/verdict/anomaly", np.zeros(4))
         file.array("/verdict/reasons", np.zeros((1, 4), dtype=bool))
         for word, text in (("kinds", "a"), ("levels", "awful"), ("texts", "b"), ("cures", "c")):
             file.names(f"/verdict/{word}", [text])
@@ -179,9 +179,9 @@ def test_frames_are_shown_in_runs_the_longest_ones():
 
 
 def test_the_worst_frames_lie_apart():
-    doubt = np.zeros(100)
-    doubt[[40, 41, 42, 80]] = 3.0, 2.0, 2.5, 1.0
+    anomaly = np.zeros(100)
+    anomaly[[40, 41, 42, 80]] = 3.0, 2.0, 2.5, 1.0
     reason = Reason("a", "bad", "", "", np.array([40]))
-    verdict = Verdict((reason,), doubt, np.arange(100) / 10.0)
+    verdict = Verdict((reason,), anomaly, np.arange(100) / 10.0)
     assert verdict.worst(3).tolist() == [40, 80]
     assert verdict.level == "bad"

@@ -122,3 +122,13 @@ def test_a_shared_model_starts_from_one_of_fewer_takes(takes, caplog) -> None:
 def test_regions_are_found_over_all_takes(takes) -> None:
     model = facert.train(takes, replace(PLAIN, regions="auto"))
     assert model.labels == 15
+
+
+def test_a_recording_given_twice_has_one_pose_a_frame(takes, caplog) -> None:
+    """Else its poses would count double, or a frame have two: those of the last take count."""
+    once, twice = (facert.train(given, PLAIN) for given in (takes[0], [takes[0], takes[0]]))
+    assert "same recording: of 10 frames posed in both" in caplog.text
+    assert twice.labels == once.labels == 10
+    changed = replace(takes[0], params=takes[0].params + 1.0)
+    found = facert.train([takes[0], changed], PLAIN)
+    np.testing.assert_array_equal(found.poses, once.poses + 1.0)

@@ -96,7 +96,7 @@ def _worst(take: Take, frames: IntArray, faces: Sequence[Face]) -> list[Picture]
 
 def _clip(take: Take, verdict: Verdict, faces: Sequence[Face]) -> Picture | None:
     """The seconds around the worst frame in motion; None where they are too large for a page."""
-    middle = float(take.time[int(np.argmax(verdict.doubt))])
+    middle = float(take.time[int(np.argmax(verdict.anomaly))])
     start = max(take.time[0], min(middle - SECONDS / 2, take.time[-1] - SECONDS))
     rows = np.flatnonzero((take.time >= start) & (take.time <= start + SECONDS))
     part = range(int(rows[0]), int(rows[-1]) + 1)
