@@ -249,13 +249,15 @@ def _poses_at(
 def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, IntArray]:
     """New frames that get the pose of an old one as it is, and those old ones.
 
-    These are the old poses that no new frame between two poses shows.
+    These are the old poses that no new frame between two poses shows, but for those amid others: of
+    animation at a lower rate every pose need not be seen.
     """
     known = np.zeros(len(take), dtype=np.bool_)
     known[take.labels] = True
     before, after, paused = _neighbours(time, take, fps)
     between = known[before] & known[after] & ~paused
-    alone = np.setdiff1d(take.labels, np.append(before[between], after[between]))
+    shown = np.append(before[between], after[between])
+    alone = np.setdiff1d(take.labels, np.append(shown, _amid_others(take, known)))
     nearest = nearest_frames(time, take.time[alone])
     shifts = np.abs(time[nearest] - take.time[alone])
     order = np.argsort(shifts, kind="stable")  # of two for one frame, the nearer one
@@ -264,6 +266,12 @@ def _single_poses(time: FloatArray, take: Take, fps: float) -> tuple[IntArray, I
     good = ~between[places] & ~paused[places] & (shifts[chosen] <= 0.5 / fps + _SAME)
     _log_moves(shifts[chosen[good]], np.setdiff1d(alone, alone[chosen[good]]), take)
     return places[good], alone[chosen[good]]
+
+
+def _amid_others(take: Take, known: BoolArray) -> IntArray:
+    """The frames with a pose that have one right before and after them, by the mask of all (T,)."""
+    joined = known[:-1] & known[1:] & (np.diff(take.time) <= PAUSE / take.fps)
+    return np.flatnonzero(joined[:-1] & joined[1:]) + 1
 
 
 def _log_moves(shifts: FloatArray, lost: IntArray, take: Take) -> None:

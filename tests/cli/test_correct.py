@@ -132,6 +132,11 @@ def test_controls_that_a_table_lacks_follow_or_stay(facert, shot, tmp_path):
     assert facert("correct", "shot.h5", "--poses", "poses.csv", "--only", "-o", "only.h5").code == 0
     only = api.read_take("only.h5").params[30]
     assert only.tolist() == [0.4, *shot.params[30, 1:]]
+    rows = "frame,jawOpen,cheekPuff\n30,0.4,\n31,,0.2\n"  # a blank cell sets nothing
+    (tmp_path / "blank.csv").write_text(rows)
+    done = facert("correct", "shot.h5", "--poses", "blank.csv", "--only", "-o", "blank.h5")
+    assert done.code == 0, done.err
+    assert (api.read_take("blank.h5").params[30] == api.read_take("only.h5").params[30]).all()
     (tmp_path / "poses.csv").write_text("frame,jawOpne\n30,0.4\n")
     failed = facert("correct", "shot.h5", "--poses", "poses.csv", "-o", "x.h5")
     assert failed.code == 3

@@ -153,6 +153,13 @@ def test_poses_of_all_frames_go_linearly() -> None:
     np.testing.assert_allclose(found.params[:, 0], found.time * 60)
 
 
+def test_a_lower_rate_loses_no_pose_of_animation(caplog: pytest.LogCaptureFixture) -> None:
+    """Every other frame of a result is shown as it is, and the others stand amid poses."""
+    found = resampled(posed(list(range(61))), 15.0)
+    assert len(found.labels) == len(found) == 16
+    assert not caplog.records
+
+
 def test_deviations_go_with_what_they_are_of() -> None:
     take = posed(list(range(61)))
     source = replace(take.source, std=line(take.time) ** 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -168,8 +169,10 @@ def _of_options(take: Take, frames: str, given: Mapping[str, float]) -> Correcte
 
 
 def _of_file(take: Take, path: Path) -> Corrected:
-    """Poses of a table or another take: whole ones, or those of the controls that it has."""
+    """Poses of a table or another take: whole ones, or those of the controls that a row has."""
     from dataclasses import replace
+
+    import numpy as np
 
     from facert.data.labelling import placed
     from facert.data.names import match
@@ -185,8 +188,9 @@ def _of_file(take: Take, path: Path) -> Corrected:
     params = take.params[:, columns]
     part = replace(take, controls=Controls(names), params=params, std=None, corrections=None)
     frames, _, values = placed(replace(part, animation=None), poses)
-    if len(names) < len(take.controls.names):
-        rows = ({name: float(v) for name, v in zip(names, row, strict=True)} for row in values)
+    if len(names) < len(take.controls.names) or np.isnan(values).any():
+        cells = (zip(names, row.tolist(), strict=True) for row in values)
+        rows = ({name: value for name, value in row if not math.isnan(value)} for row in cells)
         return dict(zip(frames.tolist(), rows, strict=True))
     ordered = values[:, match(take.controls.names, names, "names of the poses")]
     return dict(zip(frames.tolist(), ordered, strict=True))
