@@ -8,7 +8,7 @@ in turns about one axis between the two, as eyes do.
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -51,6 +51,8 @@ class Driver:
         for key in ("factor", "offset"):
             if not _is_number(getattr(self, key)):
                 raise self._wrong(key, "a number", getattr(self, key))
+        if self.property and not self.factor:
+            raise self._wrong("factor", "a number other than 0", self.factor)
         if not self.moves() and not self.property:
             raise self._wrong(self.node, "rotate, translate or property", "none, or zeros")
 
@@ -111,10 +113,10 @@ class Drivers:
     @property
     def tables(self) -> dict[str, list[dict[str, Any]]]:
         """The tables that `of` takes, as plain values that JSON can hold."""
-        return {
-            control: [one.table() for one in self.entries if one.control == control]
-            for control in self.controls
-        }
+        found: dict[str, list[dict[str, Any]]] = {}
+        for one in self.entries:
+            found.setdefault(one.control, []).append(one.table())
+        return found
 
 
 def require_used(drivers: Sequence[str], controls: Sequence[str]) -> None:
@@ -147,4 +149,4 @@ def _of_control(control: str, held: Any) -> Iterator[Driver]:
 
 def _is_number(value: Any) -> bool:
     plain = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return plain and math.isfinite(value)
+    return plain and abs(value) <= sys.float_info.max  # also of whole numbers, which have no end

@@ -52,6 +52,9 @@ def test_a_single_table_needs_no_list():
         ({"jawOpen": {"node": "jaw"}}, "jaw: expected rotate, translate or property, found"),
         ({"jawOpen": {"node": "jaw", "rotate": [0, 0, 0]}}, "found 'none, or zeros'"),
         ({"jawOpen": {"node": "jaw", "property": "a", "factor": True}}, "factor: expected a n"),
+        ({"jawOpen": {"node": "jaw", "property": "a", "factor": 0}}, "a number other than 0"),
+        ({"jawOpen": {"node": "jaw", "property": "a", "factor": 10**400}}, "expected a number"),
+        ({"jawOpen": {"node": "jaw", "rotate": [10**400, 0, 0]}}, "expected three numbers"),
     ],
 )
 def test_what_is_no_driver_is_named(tables, message):

@@ -41,7 +41,7 @@ def read_drivers(path: str) -> dict[str, Any]:
         with open(path, "rb") as file:
             tables = tomllib.load(file)
         motions_of(tables)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ScriptError(f"{path}: expected drivers in TOML: {error}") from error
     return tables
 
@@ -57,7 +57,7 @@ def motions_of(drivers: Mapping[str, Any]) -> dict[str, list[Motion]]:
             for control, held in drivers.items()
             if (tables := held if isinstance(held, list) else [held])
         }
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ScriptError(f'expected node = "eye_L", rotate = [0, 25, 0]: {error!r}') from error
 
 
@@ -107,6 +107,8 @@ def _motions(table: Mapping[str, Any]) -> list[Motion]:
     if table.get("property"):
         place = Place(node, "property", table["property"])
         factor, offset = float(table.get("factor", 1.0)), float(table.get("offset", 0.0))
+        if not factor:
+            raise ValueError("a factor of 0")
         found.append(Motion(place, (factor,), offset))
     return found
 
