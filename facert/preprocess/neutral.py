@@ -108,6 +108,9 @@ def rest_frames(text: str | None, takes: Takes) -> list[IntArray | None]:
         if which >= len(found):
             expected = plural(len(found), "take")
             raise InputError("neutral", f"frames of {expected}", repr(text), "Leave some out.")
+        if found[which] is not None:
+            expected = f"frames of {takes.names[which] or 'the take'} once"
+            raise InputError("neutral", expected, repr(text), "Leave some out.")
         found[which] = np.array(parse_frames(frames, "neutral"), dtype=np.int64)
     if found[0] is None and any(frames is not None for frames in found):
         expected, fix = f"frames of {takes.names[0]} as well", "Others are calibrated to the first."

@@ -118,6 +118,7 @@ def test_rest_is_named_by_order_or_by_file(takes):
         ("c.h5:1", "'c.h5'"),
         ("b.h5:1", "day 1/a.h5 as well"),
         ("1; 2; 3", "2 takes"),
+        ("1; day 1/a.h5:2", "once"),
     ):
         with pytest.raises(InputError, match=message):
             rest_frames(text, given)
