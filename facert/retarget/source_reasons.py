@@ -113,7 +113,8 @@ def unlike(frames: FloatArray, model: TrainedModel) -> Unlike | None:
     vectors = unexplained(frames, posed)
     amounts = over_names(relative_lengths(vectors, variance, kind))
     head, degrees = np.zeros(len(frames), dtype=np.bool_), np.zeros(len(frames))
-    if kind == "markers" and len(model.layout.names) >= HEAD_MARKERS:
+    strange = bool((amounts > NEW).any())  # else the head is none either, and aligning takes time
+    if strange and kind == "markers" and len(model.layout.names) >= HEAD_MARKERS:
         still, degrees, moved = _without_head(frames, posed, model)
         without = over_names(relative_lengths(still, variance, kind))
         steady = over_names(relative_lengths(vectors - np.median(vectors, axis=0), variance, kind))
