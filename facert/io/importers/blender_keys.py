@@ -27,7 +27,7 @@ def key_controls(face: Face, points: Mapping[str, Points], anew: bool) -> list[s
     taken = [find(control, face.controls) for control in points]
     free = [control for control in face.controls if control not in taken]
     missing = [meant(name, free) for name in absent]
-    if len(absent) == len(points):
+    if points and len(absent) == len(points):
         theirs, ours = some(missing), some(face.controls)
         raise ScriptError(f"no shape key for {theirs}; those of the objects are {ours}")
     driven, beyond = [], []

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple, TypeVar
 Read = TypeVar("Read")
 
 CLOCKS = ("time", "seconds", "time_s")
+MAX_RATE, MAX_SECONDS, MAX_FRAME = 1e4, 1e6, 10**7
+"""Most of what a file may state; programs count frames in 32 bits."""
 
 
 class ScriptError(Exception):
@@ -85,7 +87,8 @@ def read_curves(path: str) -> Curves:
 
     Raises `ScriptError` when the file is missing, or is none.
     """
-    return _reading(path, _read_json if path.lower().endswith(".json") else _read_csv)
+    read = _read_json if path.lower().endswith(".json") else _read_csv
+    return _reading(path, lambda path: _checked(read(path)))
 
 
 def read_poses(path: str) -> list[tuple[int | None, float | None, dict[str, float]]]:
@@ -118,7 +121,8 @@ def listed_frames(text: str) -> list[tuple[int, float | None]]:
     text = text.rsplit("in order of time:", 1)[-1].strip()
     if not re.fullmatch(r"\d+(?:[\s,;]+\d+)*[\s,;]*", text):
         raise ScriptError(f"expected frames such as 5,41,121, found {text[:40]!r}")
-    return [(int(number), None) for number in sorted(set(map(int, re.findall(r"\d+", text))))]
+    numbers = sorted(set(map(int, re.findall(r"\d+", text))))
+    return [(int(_within(number, 0, MAX_FRAME, "a frame")), None) for number in numbers]
 
 
 def write_poses(path: str, poses: Sequence[Pose], fps: float) -> None:
@@ -224,11 +228,48 @@ def _reading(path: str, read: Callable[[str], Read]) -> Read:
         return read(path)
     except ScriptError as error:
         raise ScriptError(f"{path}: {error}") from error
+    except ArithmeticError as error:
+        raise ScriptError(f"{path}: expected numbers of seconds and frames: {error}") from error
     except OSError as error:
         raise ScriptError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+    except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as error:
         text = f"{path}: expected a file that facert wrote, found something else ({error!r:.80})"
         raise ScriptError(text) from error
+
+
+def _checked(curves: Curves) -> Curves:
+    """Curves whose numbers are some; NaN is not known."""
+    fps, time = _within(curves.fps, 0.0, MAX_RATE, "a rate"), curves.time
+    values = {name: [_known(value) for value in column] for name, column in curves.values.items()}
+    spans = [_within(second - time[0], 0.0, MAX_SECONDS, "seconds") for second in time]
+    if not fps or any(after <= before for before, after in zip(spans, spans[1:])):
+        raise ScriptError("expected rising times, at a rate above 0")
+    if not all(
+        isinstance(name, str) and len(column) == len(time) for name, column in values.items()
+    ):
+        raise ScriptError("expected named curves, with a value for each time")
+    if all(value is None for column in values.values() for value in column):
+        raise ScriptError("expected values, found none")
+    return Curves(fps, time, values)
+
+
+def _known(value: float | None) -> float | None:
+    unknown = value is None or value != value
+    return None if unknown else _within(value, -1e30, 1e30, "a value")
+
+
+def _within(value: Any, least: float, most: float, what: str) -> float:
+    if not isinstance(value, (int, float)) or not least <= value <= most:
+        raise ScriptError(f"expected {what} from {least:g} to {most:g}, found {value!r:.40}")
+    return float(value)
+
+
+def _moment(frame: Any, seconds: Any) -> tuple[int | None, float | None]:
+    """A frame and its seconds, if they are some."""
+    return (
+        None if frame is None else int(_within(int(frame), 0, MAX_FRAME, "a frame")),
+        None if seconds is None else _within(float(seconds), -MAX_SECONDS, MAX_SECONDS, "seconds"),
+    )
 
 
 def _read_json(path: str) -> Curves:
@@ -273,7 +314,10 @@ def _read_suggestions(path: str, take: str) -> list[tuple[int, float | None]]:
         if take not in takes:
             raise ScriptError(f"expected one of the takes {some(takes)}, found {take or 'none'!r}")
         rows = [row for row in rows if row.get("file", "") == take]
-    return sorted((int(row["frame"]), float(row["seconds"])) for row in rows)
+    if not rows:
+        raise ScriptError("expected frames, found none")
+    found = sorted(_moment(row["frame"], row["seconds"]) for row in rows)
+    return [(frame, seconds) for frame, seconds in found if frame is not None]
 
 
 def _table(path: str) -> tuple[list[str], list[list[str]]]:
@@ -316,10 +360,10 @@ def _poses(
 ) -> list[tuple[int | None, float | None, dict[str, float]]]:
     rows: list[dict[str, float]] = [{} for _ in frames]
     for name, column in columns.items():
-        for row, value in zip(rows, column):
+        for row, value in zip(rows, map(_known, column)):
             if value is not None:
                 row[name] = value
-    return list(zip(frames, times, rows))
+    return [(*_moment(f, t), row) for f, t, row in zip(frames, times, rows)]
 
 
 def _rate(time: Sequence[float]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -27,6 +28,7 @@ from facert.io.importers.shared import (
     keys,
     listed_frames,
     read_curves,
+    read_suggestions,
     spelling,
     write_poses,
 )
@@ -288,3 +290,36 @@ def test_a_text_without_frames_is_named(text: str) -> None:
 def test_drivers_that_are_none(tables: dict[str, Any]) -> None:
     with pytest.raises(ScriptError, match="expected node"):
         motions_of(tables)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"exportFps": 0}, "numbers of seconds"),
+        ({"exportFps": -30}, "a rate from 0"),
+        ({"exportFps": float("inf")}, "a rate from 0"),
+        ({"weightMat": [["0.5"], [1]]}, "a value from .* found '0.5'"),
+        ({"weightMat": [[1e300], [1]]}, "a value from"),
+        ({"weightMat": [[None], [float("nan")]]}, "expected values, found none"),
+        ({"time": [0, float("nan")]}, "seconds from 0"),
+        ({"time": [0, 1e12]}, "seconds from 0"),
+        ({"time": [1, 0]}, "seconds from 0"),
+        ({"time": [0]}, "a value for each time"),
+        ({"facsNames": [5]}, "expected named curves"),
+    ],
+)
+def test_curves_of_numbers_that_no_program_takes(tmp_path: Path, changed: Any, message: str):
+    document = {"exportFps": 30, "facsNames": ["jawOpen"], "weightMat": [[0.5], [1]]} | changed
+    (tmp_path / "a.json").write_text(json.dumps(document))
+    with pytest.raises(ScriptError, match=rf"a\.json: expected .*{message}|a\.json: {message}"):
+        read_curves(str(tmp_path / "a.json"))
+
+
+@pytest.mark.parametrize(
+    "rows", [[], [[-5, 0]], [[1e400, 0]], [[2**40, 0]], [[5, 1e300]], [[5, float("nan")]]]
+)
+def test_suggestions_of_no_frames(tmp_path: Path, rows: Any) -> None:
+    frames = [{"frame": frame, "seconds": seconds} for frame, seconds in rows]
+    (tmp_path / "a.json").write_text(json.dumps({"frames": frames}))
+    with pytest.raises(ScriptError, match=r"a\.json: expected "):
+        read_suggestions(str(tmp_path / "a.json"))
