@@ -1,6 +1,6 @@
 """A second take of the same actor: what a few of its poses, or none, are worth.
 
-    python -m experiments.second_take [--labels 10 20 40] [--more 5]
+    python -m experiments.second_take [--labels 10 20 40] [--more 5] [--weights]
 
 A model is trained on suggested frames of one track (`--labels`). Of another track of the same actor
 `--more` frames are posed that `facert suggest --have MODEL` names, and a model is trained on both.
@@ -10,7 +10,8 @@ RMS over the other frames of either track, for every pair of tracks:
             alone, and of both; and of the first, with the second as a take without any pose
     first   of the first track, by the first model and by that of both
 
-Frames are taken as they are recorded (they are free of noise). Tables go into experiments/results.
+Frames are taken as they are recorded (they are free of noise), as markers; with `--weights` as the
+phone's weights, whose target is the other rig's units. Tables go into experiments/results.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from threadpoolctl import threadpool_limits
 
 from experiments.grid import OPTICAL, RESULTS, SPEECH, begin_log, log
 from experiments.report import markdown, write_csv, write_text
-from experiments.tracks import read_track
-from facert import Retargeter, Settings, Take, train
+from experiments.tracks import DATA, read_track
+from facert import Retargeter, Settings, Take, read_take, train
 from facert.data.arrays import IntArray, rms
 from facert.data.take import Controls
 from facert.posing.suggested_frames import suggest_frames
@@ -92,11 +93,21 @@ def error(model: Retargeter, truth: Take, without: IntArray) -> float:
     return rms(result.params - truth.params[frames])
 
 
-def pairs(target: str, tracks: tuple[str, ...]) -> Iterator[tuple[str, str, Take, Take]]:
+def pairs(
+    target: str, tracks: tuple[str, ...], weights: bool
+) -> Iterator[tuple[str, str, Take, Take]]:
     """Pairs of tracks with the controls that both have."""
     takes = {name: read_track(name, target) for name in tracks}
+    if weights:
+        takes = {name: tracked(take, name) for name, take in takes.items()}
     for one, other in permutations(tracks, 2):
         yield one, other, *_shared(takes[one], takes[other])
+
+
+def tracked(take: Take, name: str) -> Take:
+    """The poses of a track with the recording that it was made of as their source."""
+    recording = read_take(DATA / "recordings" / f"{name}.csv")
+    return replace(take, time=recording.time, source=recording.source, units="")
 
 
 def _shared(one: Take, other: Take) -> tuple[Take, Take]:
@@ -113,9 +124,11 @@ def _cut(take: Take, names: tuple[str, ...]) -> Take:
     return replace(take, controls=Controls(names), params=take.params[:, columns])
 
 
-def measure(target: str, tracks: tuple[str, ...], labels: int, more: int) -> Iterator[Row]:
+def measure(
+    target: str, tracks: tuple[str, ...], labels: int, more: int, weights: bool
+) -> Iterator[Row]:
     """The rows of all pairs of some tracks."""
-    for one, other, first, second in pairs(target, tracks):
+    for one, other, first, second in pairs(target, tracks, weights):
         frames = suggest_frames(first, labels).frames
         given = posed(first, frames)
         model = train(given, AS_RECORDED)
@@ -141,15 +154,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--labels", type=int, nargs="+", default=[10, 20, 40])
     parser.add_argument("--more", type=int, default=5)
+    parser.add_argument("--weights", action="store_true", help="the phone's weights as source")
     options = parser.parse_args()
     begin_log()
     rows: list[Row] = []
     with threadpool_limits(1):
         for labels in options.labels:
-            for target, tracks in PROBLEMS:
-                for row in measure(target, tracks, labels, options.more):
+            for target, tracks in PROBLEMS[:1] if options.weights else PROBLEMS:
+                for row in measure(target, tracks, labels, options.more, options.weights):
                     rows.append(row)
-                    write(rows, options.more)
+                    write(rows, options.more, "_weights" if options.weights else "")
     print(summary(rows))
 
 
@@ -164,20 +178,20 @@ def summary(rows: list[Row]) -> str:
     return markdown(("labels", *HEADER[-3:]), cells, texts=0)
 
 
-def write(rows: list[Row], more: int) -> None:
+def write(rows: list[Row], more: int, which: str) -> None:
     """The table and the CSV file, of as many pairs as there are."""
     parts = [
         "# A second take of the same actor",
         f"RMS in a second track of models of the first, of {more} suggested poses of the second and"
         " of both; and ratios: of both to the better of these two; of the first with the second as"
         " a take without a pose, to the first alone; and of both to the first alone in the first"
-        " track. Written by `python -m experiments.second_take`.",
+        f" track. Written by `python -m experiments.second_take{' --weights' * bool(which)}`.",
         "Means, and in brackets the worst:",
         summary(rows),
         markdown(HEADER, [row.cells for row in rows], texts=3),
     ]
-    write_text(RESULTS / "second_take.md", parts)
-    write_csv(RESULTS / "second_take.csv", [asdict(row) for row in rows])
+    write_text(RESULTS / f"second_take{which}.md", parts)
+    write_csv(RESULTS / f"second_take{which}.csv", [asdict(row) for row in rows])
 
 
 if __name__ == "__main__":
