@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from shlex import quote
 from typing import Literal, get_args
 
 import numpy as np
@@ -48,8 +49,8 @@ class Reason:
         frozen(self.frames)
 
     def cure_for(self, take: str, model: str) -> str:
-        """The cure with the names of the files."""
-        words = {"TAKE": take, "MODEL": model}
+        """The cure with the names of the files, as a shell takes them."""
+        words = {"TAKE": quote(take), "MODEL": quote(model)}
         return " ".join(words.get(word, word) for word in self.cure.split(" "))
 
 

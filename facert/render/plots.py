@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from facert.data.arrays import FloatArray
 from facert.data.names import fitting_some
 from facert.data.take import Take
+from facert.data.text import printable
 from facert.errors import InputError
 from facert.render.faces import INK, require_poses
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 CURVE, TRUTH = "#1f6f8b", "#c9a26b"
 MOST = 8  # curves, if none are named
 MAX_CURVES = 40
+MOST_LETTERS = 32  # of a name: longer ones would leave no room for the curves
 
 
 def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = ()) -> Figure:
@@ -108,7 +110,7 @@ def _draw_curve(axes: Axes, take: Take, column: int) -> None:
 
 
 def _tidy(axes: Axes, name: str) -> None:
-    axes.set_ylabel(name, rotation=0, ha="right", va="center", color=INK)
+    axes.set_ylabel(printable(name, MOST_LETTERS), rotation=0, ha="right", va="center", color=INK)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.005)
     axes.tick_params(colors=INK, labelsize=8)

@@ -68,3 +68,15 @@ def test_the_truth_of_another_take_is_refused(facert, make_take, path, tmp_path)
     assert refused.code == 3
     assert f"{other}: --truth: expected 40 frames, found 80" in refused.err
     assert not (tmp_path / "curves.png").exists()
+
+
+def test_names_of_controls_are_drawn_as_text(tmp_path, make_take, facert):
+    """No mathematics, which may be wrong, and no longer than leaves room for curves."""
+    take = make_take(frames=20, posed=20)
+    assert take.controls is not None
+    names = (r"$\frac{$", "x" * 200, *take.controls.names[2:])
+    path = tmp_path / "a.h5"
+    write_take(replace(take, controls=replace(take.controls, names=names)), path)
+    done = facert("plot", path, tmp_path / "a.png")
+    assert (done.code, (tmp_path / "a.png").exists()) == (0, True)
+    assert "UserWarning" not in done.err

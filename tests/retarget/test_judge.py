@@ -60,6 +60,7 @@ def test_a_head_that_turns_is_named_with_its_frames_and_is_no_new_expression(mod
     assert reason.frames[-1] == 119
     assert "degrees against the training take" in reason.text
     assert "stabilise shot.h5" in reason.cure_for("shot.h5", "m")
+    assert "stabilise 'a b$(c).h5'" in reason.cure_for("a b$(c).h5", "m")
     assert "new expressions" not in [r.kind for r in verdict.reasons]
     assert verdict.worst(3).min() > 40
 

@@ -180,6 +180,9 @@ def write_beside(take: Take, output: Path, overwrite: bool, beside: Beside) -> N
 
 def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
     """Write a figure in the format of the file's ending."""
+    from facert.render.texts import take_texts_as_they_are
+
+    take_texts_as_they_are(figure)
     with replacing(path, overwrite) as temporary:
         figure.savefig(temporary)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from facert.pages.report.sections import Picture
+from facert.render.texts import take_texts_as_they_are
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -25,8 +26,9 @@ def embedded(figure: Figure, caption: str, form: Literal["svg", "png"]) -> Pictu
     """
     import matplotlib
 
+    take_texts_as_they_are(figure)
     for artist in figure.findobj():
-        _prepare(artist)
+        _simplify(artist)
     options: dict[str, Any] = {"metadata": {"Date": None}} if form == "svg" else {}
     buffer = BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "facert"}):
@@ -37,15 +39,12 @@ def embedded(figure: Figure, caption: str, form: Literal["svg", "png"]) -> Pictu
     )
 
 
-def _prepare(artist: Artist) -> None:
-    """Take texts as they are, and draw what is long as pixels."""
+def _simplify(artist: Artist) -> None:
+    """Draw what is long as pixels."""
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
-    from matplotlib.text import Text
 
-    if isinstance(artist, Text):
-        artist.set_parse_math(False)  # a control may be called $x
-    elif isinstance(artist, Line2D):
+    if isinstance(artist, Line2D):
         artist.set_rasterized(np.size(artist.get_xdata()) > MOST_POINTS)
     elif isinstance(artist, PolyCollection):
         points = sum(np.shape(path.vertices)[0] for path in artist.get_paths())
