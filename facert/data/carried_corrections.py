@@ -46,7 +46,11 @@ def carried(earlier: Take, result: Take) -> Corrections | None:
 
 def _require_controls(earlier: tuple[str, ...], new: tuple[str, ...]) -> None:
     """Refuse controls that are corrected and that the new result lacks."""
-    match(earlier, new, "controls of the model")
+    try:
+        match(earlier, new, "controls of the model")
+    except InputError as error:
+        error.fix = "Retarget by a model of these controls, or leave them out: --drop-corrections."
+        raise
 
 
 def _require_same_frames(earlier: Take, result: Take) -> None:

@@ -43,7 +43,7 @@ def advise(outcomes: Sequence[Outcome], tested: int | None = None, chosen: bool 
     last = {method: table[-1] for method, table in errors.items()}
     best = min(last, key=lambda method: float(last[method].mean()))
     named = DEFAULT if DEFAULT in last and not _beaten(last[DEFAULT] - last[best]) else best
-    equals = [other for other in last if other != named and not _beaten(last[other] - last[named])]
+    equals = [other for other in last if other != named and _ties(last[other] - last[named])]
     equals.sort(key=lambda method: float(last[method].mean()))
     as_good = f" ({' and '.join(equals)} within one standard error of it)" if equals else ""
     parts = [f"Use {named} for this take{as_good}.", _about_labels(labels, errors[named])]
@@ -77,4 +77,10 @@ def _about_labels(labels: Sequence[int], errors: FloatArray) -> str:
 def _beaten(behind: FloatArray) -> bool:
     """Whether the mean of a difference, one number a draw, is above its standard error."""
     distance = MeanWithError.of(behind)
-    return distance.value > (0.0 if np.isnan(distance.se) else distance.se)
+    return distance.value > distance.se  # not by a single draw, which has none
+
+
+def _ties(behind: FloatArray) -> bool:
+    """Whether the mean of a difference is within its standard error."""
+    distance = MeanWithError.of(behind)
+    return distance.value <= distance.se

@@ -269,6 +269,7 @@ def test_corrections_of_another_character_are_not_lost(facert, shot, take):
     failed = facert(*asked)
     assert failed.code == 3
     assert "'cheekPuff'" in failed.err
+    assert "--drop-corrections" in failed.err
 
 
 def test_predicted_poses_are_no_truth(facert, shot):

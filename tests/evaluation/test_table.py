@@ -109,6 +109,12 @@ def test_advice_and_table_go_by_the_same_number_at_the_most_labels():
     assert advise(outcomes).startswith(f"Use {named} for this take.")
 
 
+def test_one_draw_beats_nothing():
+    """A single one has no standard error: the default is named, and what ties it is not known."""
+    text = advise(table({"auto": {10: [0.21]}, "b": {10: [0.20]}}))
+    assert text.startswith("Use auto for this take. ")
+
+
 def test_the_default_is_named_unless_it_is_clearly_beaten():
     near = {"auto": {10: [0.11, 0.20]}, "a": {10: [0.10, 0.201]}}
     assert advise(table(near)).startswith("Use auto for this take (a within one standard error")

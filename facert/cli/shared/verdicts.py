@@ -31,7 +31,7 @@ def print_verdicts(verdicts: Verdicts, model: Path, many: bool) -> None:
     for pair in order:
         verdict, name = verdicts[pair], pair[0].name
         reasons = [r for r in verdict.reasons if not many or r.level != LEVELS[0]]
-        lines = [_said(reason, name, model) for reason in reasons] or [""]
+        lines = [_in_words(reason, name, model) for reason in reasons] or [""]
         if many and reasons[1:]:
             kinds = dict.fromkeys(reason.kind for reason in reasons[1:])
             lines = [f"{lines[0]} (also: {', '.join(kinds)})"]
@@ -41,7 +41,7 @@ def print_verdicts(verdicts: Verdicts, model: Path, many: bool) -> None:
             console.show(f"{'':{width + 13}}{escaped(line)}")
 
 
-def _said(reason: Reason, take: str, model: Path) -> str:
+def _in_words(reason: Reason, take: str, model: Path) -> str:
     """A reason with its cure."""
     return f"{reason.kind}: {reason.text} -> {reason.cure_for(take, model.name)}"
 
