@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,8 @@ from facert.data.take import Controls, Corrections, Take
 from facert.errors import InputError
 from facert.posing.completed_pose import complete_pose, given_controls
 from facert.retarget.retargeter import Retargeter
+
+log = logging.getLogger("facert")
 
 FEWEST = 0.5  # of the frames of a result that have a pose
 
@@ -65,6 +68,8 @@ def correct_take(
         limits, or no character where one is needed.
     """
     require_result(result)
+    if result.std is None and not result.model and result.corrections is None:
+        log.warning("whose its poses are is not known: all but corrected ones count as predicted")
     if not poses:
         raise InputError("frames", "one to correct", "none", "Name a frame and its controls.")
     frames = _frame_numbers(poses)
@@ -81,7 +86,7 @@ def _frame_numbers(poses: Mapping[int, Mapping[str, float] | ArrayLike]) -> IntA
     """The numbers of the frames, (c,), rising."""
     numbers = np.array(sorted(poses))
     if numbers.dtype.kind not in "iu":
-        expected, found = "whole numbers of frames", f"{numbers[0]!r}"
+        expected, found = "whole numbers of frames", f"{numbers[0]}"
         raise InputError("frame", expected, found, "Count frames from 0.")
     return numbers.astype(np.int64)
 

@@ -353,3 +353,17 @@ def test_a_damaged_recording_in_a_result_is_named(facert, shot):
     failed = facert("correct", "shot.h5", *asked)
     assert failed.code == 3
     assert "shot.h5: /recorded/markers: expected shape (60), found shape (30,)" in failed.err
+
+
+def test_poses_of_unknown_origin_are_not_taken_for_predicted_unsaid(make_take, shot, caplog):
+    """A take that an animator posed as a whole looks like a result without deviations."""
+    whole = make_take(posed=60)
+    api.correct(shot, {3: {"jawOpen": 0.2}}, only=True)
+    assert not caplog.records
+    made = api.correct(whole, {3: {"jaw": 0.2}}, only=True)
+    assert "count as predicted" in caplog.text
+    caplog.clear()
+    api.correct(made, {4: {"jaw": 0.2}}, only=True)
+    with pytest.raises(api.InputError, match="whole numbers of frames, found 3.5"):
+        api.correct(shot, {3.5: {"jawOpen": 0.2}}, only=True)
+    assert not caplog.records
