@@ -22,6 +22,7 @@ from facert.data.take import Controls, Source, Take
 from facert.data.takes import Takes, separated
 from facert.data.text import plural
 from facert.errors import InputError
+from facert.preprocess.clean_source import other_unit
 from facert.preprocess.faults import without_faults
 from facert.preprocess.known_poses import keep, pose_bounds
 from facert.preprocess.motion.estimate import LEAST_NOISE, MotionEstimate, estimate_if_it_moves
@@ -220,14 +221,16 @@ def _warn_of_distance(takes: Takes) -> None:
         return
     matrices = [part.source.matrix for part in takes.parts]
     first, *others = ((_centre(X), _largest_motion(X)) for X in matrices)
-    for name, (centre, motion) in zip(takes.names[1:], others, strict=True):
+    kind = takes.parts[0].source.kind
+    for name, X, (centre, motion) in zip(takes.names[1:], matrices[1:], others, strict=True):
         away = float(np.nanmedian(np.abs(centre - first[0]))) / max(first[1], motion)
         if away > APART:
-            log.warning(
-                "%s lies far from %s, most of it %.2g times as far as the face moves: another "
-                "unit, or head motion that facert stabilise takes out?",
-                *(name, takes.names[0], away),
-            )
+            cause = "another unit, or head motion that facert stabilise takes out?"
+            if kind == "weights":
+                other = "another tracker? --neutral names frames at rest"
+                cause = other_unit(X, first[0]) or other
+            text = "%s lies far from %s, most of it %.2g times as far as the face moves: %s"
+            log.warning(text, name, takes.names[0], away, cause)
 
 
 def _centre(X: FloatArray) -> FloatArray:

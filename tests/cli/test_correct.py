@@ -364,6 +364,6 @@ def test_poses_of_unknown_origin_are_not_taken_for_predicted_unsaid(make_take, s
     assert "count as predicted" in caplog.text
     caplog.clear()
     api.correct(made, {4: {"jaw": 0.2}}, only=True)
-    with pytest.raises(api.InputError, match="whole numbers of frames, found 3.5"):
+    with pytest.raises(api.InputError, match=r"whole numbers of frames, found 3\.5"):
         api.correct(shot, {3.5: {"jawOpen": 0.2}}, only=True)
     assert not caplog.records

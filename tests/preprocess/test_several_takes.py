@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facert.data.matching_takes import as_takes
-from facert.data.take import Source
+from facert.data.take import Source, Take
 from facert.errors import InputError
 from facert.preprocess.motion.estimate import estimate
 from facert.preprocess.motion.motion import Motion
@@ -155,3 +155,15 @@ def test_a_take_in_another_unit_that_no_file_states_is_warned_of(make_take, capl
 def far_matrix(take):
     """A few markers far from the origin, as all are, in millimetres."""
     return 10.0 * (take.source.matrix + np.linspace(0.0, 20.0, take.source.matrix.shape[1]))
+
+
+def test_weights_in_percent_beside_shares_are_named(caplog):
+    shares = np.abs(np.sin(np.arange(60)[:, None] / np.array([5.0, 7.0])))
+    takes = [
+        Take(np.arange(60) / 30.0, Source(scale * shares, ("jaw", "smile")), None)
+        for scale in (1.0, 100.0)
+    ]
+    prepare(as_takes(takes, names=("a.csv", "b.csv")), Settings(smooth=False))
+    assert "b.csv lies far from a.csv" in caplog.text
+    assert "percent instead of fractions" in caplog.text
+    assert "stabilise" not in caplog.text
