@@ -123,10 +123,13 @@ class PoseEditor:
         self.pin_all({control: value})
 
     def pin_all(self, pins: Mapping[int, float]) -> None:
-        """Hold some controls as well."""
-        for control, value in pins.items():
+        """Hold some controls as well, within their declared limits: numbers are typed, too."""
+        held = self.pose.copy()
+        held[list(pins)] = list(pins.values())
+        held = self._limited(held)
+        for control in pins:
             self.pins.pop(control, None)  # the one that was pinned last comes last
-            self.pins[control] = value
+            self.pins[control] = float(held[control])
         self._posed = self._solve(0, 0)
 
     def let_go(self, control: int) -> None:
@@ -147,10 +150,7 @@ class PoseEditor:
 
     def pin_counterpart(self, control: int) -> None:
         """Hold a pinned control's counterpart on the other side at its value."""
-        other = int(self.counterparts[control])
-        pose = self.pose.copy()
-        pose[other] = self.pins[control]
-        self.pin(other, float(self._limited(pose)[other]))
+        self.pin(int(self.counterparts[control]), self.pins[control])
 
     def learn(self, known: KnownPoses | None) -> None:
         """Replace the known poses that completions are learned from."""

@@ -111,6 +111,15 @@ def test_sliders_reach_limits_or_all_that_is_known(editor, character) -> None:
     assert limited.tolist() == [[-1, 1], [0, 1], [0, 2], [0, 1]]
 
 
+def test_a_number_beyond_the_limits_is_held_at_them() -> None:
+    """The field beside a slider takes any number: 5 for .5 is no pose."""
+    limits = np.array([[-1.0, 1], [0, np.inf], [-np.inf, 2], [0, 1]])
+    editor = PoseEditor(Controls(NAMES, limits))
+    editor.pin_all({0: -7.0, 1: 30.0, 3: 5.0})
+    assert editor.pins == {0: -1.0, 1: 30.0, 3: 1.0}
+    assert editor.pose.tolist() == [-1.0, 30.0, 0.0, 1.0]
+
+
 def test_a_mirrored_pose_has_its_sides_exchanged_within_the_limits() -> None:
     limits = np.array([[0.0, 1.0], [-1.0, 1.0], [0.0, 0.5]])
     editor = PoseEditor(Controls(["smile_L", "jaw", "smile_R"], limits))
