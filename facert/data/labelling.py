@@ -73,6 +73,8 @@ def labelled(take: Take, poses: Poses) -> Take:
         log.info("%s that a model predicted: left out", plural(predicted, "pose"))
         take = without_predicted(take)
     frames, controls, values = placed(take, poses)
+    with reading(poses.where):
+        _require_whole(frames, controls, values)
     params = np.full((len(take), len(controls.names)), np.nan)
     if take.params is not None and len(take.labels):
         params[:] = take.params
@@ -237,6 +239,19 @@ def _require_different(frames: IntArray) -> None:
     if (counts > 1).any():
         twice = found[counts > 1][0]
         raise InputError("rows", "one pose a frame", f"two for {twice}", "Remove one of them.")
+
+
+def _require_whole(frames: IntArray, controls: Controls, values: FloatArray) -> None:
+    """Refuse poses (n, P) of frames that lack the value of a control."""
+    lacking = np.argwhere(np.isnan(values))
+    if len(lacking):
+        row, column = lacking[0].tolist()
+        expected, found = (
+            "a value for every control",
+            f"none for {controls.names[column]!r}: known in part",
+        )
+        fix = "Write 0 for a control at rest; a row without any number is no pose."
+        raise InputError(f"pose of frame {frames[row]}", expected, found, fix)
 
 
 def _common_controls(take: Take, poses: Poses) -> tuple[Controls, IntArray]:

@@ -82,14 +82,18 @@ def warn_of_labels(take: Take, name_of: Callable[[int], str] = str) -> None:
 
 
 def _large_columns(labels: _Labels) -> BoolArray:
-    """Controls in percent or degrees where most are shares, (P,): all their values are large."""
+    """Controls in percent or degrees where most are shares, (P,): all their values are large.
+
+    Where limits say that a control is a share, it is one whatever the others are.
+    """
     sizes = labels.sizes
     highest = sizes.max(axis=0)
     shares = (highest > 0.0) & (highest <= SHARES)
     large = (highest > BIG) & (_own(sizes) > SHARES)
-    large &= highest > _widest(labels.limits)
+    widest = _widest(labels.limits)
+    large &= highest > widest
     if shares.sum() < MOST * (highest > 0.0).sum():
-        return np.zeros(len(highest), dtype=np.bool_)
+        large &= (widest > 0.0) & (widest <= SHARE)
     return np.asarray(large)
 
 

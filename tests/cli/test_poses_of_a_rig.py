@@ -72,7 +72,7 @@ def test_a_pose_known_in_part_stays_an_error(facert, files) -> None:
     assert "known in part" in refused.err
 
 
-def test_limits_are_told_and_overruled(facert, files) -> None:
+def test_limits_are_logged_and_overruled(facert, files) -> None:
     capture, poses, rig = files
     output = capture.with_name("posed.h5")
     command = ("convert", capture, output, "--poses", poses, "--overwrite")

@@ -20,11 +20,11 @@ def _shares() -> np.ndarray:
     return rng.random((16, 8)).round(4) * (rng.random((16, 8)) < 0.5)
 
 
-@pytest.fixture(name="heard")
-def _heard(caplog: pytest.LogCaptureFixture):
+@pytest.fixture(name="logged")
+def _logged(caplog: pytest.LogCaptureFixture):
     """What is logged of poses, a line each; notes begin with a bracket."""
 
-    def heard(poses: np.ndarray, names=NAMES, limits=None) -> list[str]:
+    def logged(poses: np.ndarray, names=NAMES, limits=None) -> list[str]:
         caplog.clear()
         caplog.set_level(logging.INFO, "facert")
         limits = None if limits is None else np.tile(limits, (len(names), 1))
@@ -34,69 +34,76 @@ def _heard(caplog: pytest.LogCaptureFixture):
         notes = caplog.records
         return [("" if r.levelno >= logging.WARNING else "(") + r.getMessage() for r in notes]
 
-    return heard
+    return logged
 
 
-def test_a_control_in_percent_is_named_with_value_and_fix(shares, heard) -> None:
+def test_a_control_in_percent_is_named_with_value_and_fix(shares, logged) -> None:
     shares[:, 0] *= 100
-    (line,) = heard(shares)
+    (line,) = logged(shares)
     assert line.startswith("in percent or degrees")
     assert f"jawOpen up to {shares[:, 0].max():.4g}" in line
     assert "divide" in line
     assert "--limits 'jawOpen=0..100'" in line
-    assert len(heard(shares, limits=(0.0, 1.0))) == 1
-    assert heard(shares, limits=(0.0, 100.0)) == []
+    assert len(logged(shares, limits=(0.0, 1.0))) == 1
+    assert logged(shares, limits=(0.0, 100.0)) == []
+
+
+def test_poses_all_in_percent_are_known_by_the_limits_of_the_rig(shares, logged) -> None:
+    """Without limits they are a rig that counts so."""
+    assert logged(100 * shares) == []
+    (line,) = logged(100 * shares, limits=(0.0, 1.0))
+    assert line.startswith("in percent or degrees")
 
 
 @pytest.mark.parametrize("rows", [[4], [0, 3, 5, 6, 9, 11, 12, 15]])
-def test_rows_in_percent_are_named_once(shares, heard, rows) -> None:
+def test_rows_in_percent_are_named_once(shares, logged, rows) -> None:
     shares[rows] = np.where(shares[rows] > 0.05, 100 * shares[rows], 0)
-    (line,) = heard(shares)
+    (line,) = logged(shares)
     assert f"({', '.join(map(str, rows[:5]))}" in line
     assert "in percent" in line
     assert "divide them by 100" in line
 
 
-def test_honest_rigs_are_not_warned_of(shares, heard) -> None:
+def test_honest_rigs_are_not_warned_of(shares, logged) -> None:
     metahuman = shares * np.where(np.arange(8) % 2, -1, 1)
     jaw = np.linspace(0, 25, 16)[:, None]
     ten, overdriven = shares.copy(), shares.copy()
     ten[:, 3:6] *= 10
     overdriven[3, 4] = 1.4
     for poses in (shares, metahuman, 100 * shares, 10 * shares, ten, overdriven):
-        assert heard(poses) == []
-    assert heard(jaw, names=("jaw_angle",)) == []
-    assert heard(np.hstack([shares[:, :2] * 100, jaw]), names=("a", "b", "jaw")) == []
+        assert logged(poses) == []
+    assert logged(jaw, names=("jaw_angle",)) == []
+    assert logged(np.hstack([shares[:, :2] * 100, jaw]), names=("a", "b", "jaw")) == []
 
 
-def test_an_angle_by_its_name_is_a_note(shares, heard) -> None:
+def test_an_angle_by_its_name_is_a_note(shares, logged) -> None:
     shares[:, 2] = np.linspace(-30, 40, 16)
     names = ("jawOpen", "smile_L", "head_rotateX", *NAMES[3:])
-    (line,) = heard(shares, names=("jawOpen", "smile_L", "head.rotX", *NAMES[3:]))
+    (line,) = logged(shares, names=("jawOpen", "smile_L", "head.rotX", *NAMES[3:]))
     assert line.startswith("(angles among shares: head.rotX up to 40")
-    assert heard(shares, names=names)[0].startswith(("(", "in percent"))
+    assert logged(shares, names=names)[0].startswith(("(", "in percent"))
 
 
-def test_many_poses_at_one_highest_value_were_cut_off(shares, heard) -> None:
+def test_many_poses_at_one_highest_value_were_cut_off(shares, logged) -> None:
     clipped = np.minimum(shares, 0.4)
-    (line,) = heard(clipped)
+    (line,) = logged(clipped)
     assert "cut off, it seems" in line
     assert "jawOpen at 0.4 in" in line
     by_hand = np.minimum(np.round(shares * 20) / 20, 0.4)
-    assert heard(by_hand) == []
+    assert logged(by_hand) == []
     beyond = np.minimum(2.0 * shares, 1.0)
-    (line,) = heard(beyond)
+    (line,) = logged(beyond)
     assert line.startswith("(often exactly where they end")
 
 
-def test_a_value_beyond_its_limits_is_named(shares, heard) -> None:
+def test_a_value_beyond_its_limits_is_named(shares, logged) -> None:
     shares[2, 1] = 1.5
-    (line,) = heard(shares, limits=(0.0, 1.0))
+    (line,) = logged(shares, limits=(0.0, 1.0))
     assert "frame 2 has smile_L at 1.5, beyond its limits 0..1" in line
     assert "--limits 'smile_L=0..1.5'" in line
 
 
-def test_controls_that_no_pose_moves_are_named_in_one_line(shares, heard) -> None:
+def test_controls_that_no_pose_moves_are_named_in_one_line(shares, logged) -> None:
     shares[:, [5, 6]] = 0
-    assert heard(shares) == ["(2 controls that no pose moves, and no prediction will: "
+    assert logged(shares) == ["(2 controls that no pose moves, and no prediction will: "
                              "blink_L, blink_R"]  # fmt: skip
