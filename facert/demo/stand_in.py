@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 
 from facert.data.arrays import FloatArray
@@ -10,6 +12,10 @@ from facert.data.take import Take
 from facert.demo.files import arkit_face
 from facert.render.faces import Face, driven_face
 
+log = logging.getLogger("facert")
+
+WITHIN = 2.5
+"""Shares reach so far at most, but for slips."""
 _LEAST = 5  # names of ARKit
 _OTHER_LIDS = {"eyeSquint": 1, "eyeWide": 1, "eyeLookUp": 3, "eyeLookDown": 3}
 """Shapes that move the lids as well, and how late they leave them to `eyeBlink`."""
@@ -41,7 +47,8 @@ def stand_in_weights(take: Take) -> FloatArray:
     """Weights (T, 52) of `ARKIT_SHAPES` from those of a take.
 
     NaN where nothing was observed of a frame; else what is hidden counts as 0. Lids that are closed
-    are closed no further by other shapes, which would turn them inside out.
+    are closed no further by other shapes, which would turn them inside out. Weights in percent are
+    shown as shares, with a warning.
     """
     values, names = take.source.values, take.source.names
     index = NameIndex.among(names, ARKIT_SHAPES, "/source/names", halves=True, quiet=True)
@@ -50,6 +57,7 @@ def stand_in_weights(take: Take) -> FloatArray:
         columns = index.find_halves(shape)
         if columns:
             weights[:, place] = np.nan_to_num(values[:, columns]).mean(axis=1)
+    weights /= _whole(weights)
     for side in ("Left", "Right"):
         blink = np.clip(weights[:, _place(f"eyeBlink{side}")], 0, 1)
         for shape, late in _OTHER_LIDS.items():
@@ -57,6 +65,15 @@ def stand_in_weights(take: Take) -> FloatArray:
         weights[:, _place(f"eyeBlink{side}")] = blink
     weights[np.isnan(values).all(axis=1)] = np.nan
     return weights
+
+
+def _whole(weights: FloatArray) -> float:
+    """What stands for 1 in weights (T, D): 100 where they are in percent, as most frames show."""
+    largest = float(np.quantile(weights.max(axis=1), 0.9))
+    if largest <= WITHIN:
+        return 1.0
+    log.warning("the weights go up to %.3g: taken for percent in the actor's face", largest)
+    return 100.0
 
 
 def _place(shape: str) -> int:

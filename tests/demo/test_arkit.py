@@ -155,3 +155,11 @@ def test_halves_make_a_whole_and_what_was_not_seen_is_blank() -> None:
     seen, lost = stand_in_face(tracked(names, values)).motion.fetch(np.arange(2))
     assert np.isfinite(seen).all()
     assert np.isnan(lost).all()
+
+
+def test_weights_in_percent_are_shown_as_shares(caplog) -> None:
+    names, shares = ARKIT_SHAPES[:6], np.linspace(0, 1, 60).reshape(10, 6)
+    expected = stand_in_weights(tracked(names, shares))
+    assert not caplog.records
+    np.testing.assert_allclose(stand_in_weights(tracked(names, 100 * shares)), expected)
+    assert "taken for percent" in caplog.text
