@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -100,16 +101,12 @@ def of_character(take: Take, controls: Controls) -> Take:
     if take.controls is None or take.controls.names == controls.names:
         return take if take.controls is None else replace(take, controls=controls)
     places = _places(take.controls.names, controls, "/target/names")
-
-    def spread(values: FloatArray | None) -> FloatArray | None:
-        return None if values is None else _spread(values, places, len(controls.names))
-
-    params, std, animation = map(spread, (take.params, take.std, take.animation))
-    corrections = take.corrections
-    if corrections is not None:
-        corrected = _spread(corrections.params, places, len(controls.names))
-        predicted, deviations = map(spread, (corrections.predicted, corrections.std))
-        corrections = replace(corrections, params=corrected, predicted=predicted, std=deviations)
+    spread = partial(_spread, places=places, count=len(controls.names))
+    params, std, animation = (
+        None if values is None else spread(values)
+        for values in (take.params, take.std, take.animation)
+    )
+    corrections = None if take.corrections is None else take.corrections.mapped(spread)
     return replace(
         take,
         controls=controls,

@@ -6,7 +6,7 @@ the field by its path in the HDF5 layout. Arrays are float64 and read-only: a ta
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -184,11 +184,14 @@ class Corrections:
 
     def of_controls(self, columns: IntArray) -> Corrections:
         """The corrections with the controls in these columns, in their order."""
+        return self.mapped(lambda poses: poses[:, columns])
+
+    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> Corrections:
+        """The corrections with all poses, (n, P), changed alike to those of other controls."""
         predicted, std = (
-            None if values is None else values[:, columns] for values in (self.predicted, self.std)
+            None if poses is None else change(poses) for poses in (self.predicted, self.std)
         )
-        params = self.params[:, columns]
-        return replace(self, params=params, predicted=predicted, std=std)
+        return replace(self, params=change(self.params), predicted=predicted, std=std)
 
     def require_fit(self, shape: tuple[int, ...]) -> None:
         """Check that these are corrections of a take with poses of this shape, (T, P)."""

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.data.corrections import at_frames, merged, put_in, taken_out, without
+from facert.data.labelling import of_character, predicted_poses
 from facert.data.resampling import resampled
 from facert.data.take import Controls, Corrections, Source, Take
 from facert.errors import InputError
@@ -184,3 +185,14 @@ def test_of_corrections_that_meet_in_one_frame_the_first_counts(caplog):
     found = at_frames(fix(20, 21), np.array([10, 10]))
     assert found.frames.tolist() == [10]
     assert "1 correction left out" in caplog.text
+
+
+def test_corrections_go_with_the_controls_of_a_character():
+    """Without deviations they alone show which poses were predicted."""
+    made = put_in(replace(result(), std=None), fix(20))
+    names = made.controls.names
+    found = of_character(made, Controls((*names[::-1], "ears")))
+    assert found.corrections.frames.tolist() == [20]
+    assert found.corrections.params.tolist() == [[0.05, 0.9, 0.0]]
+    np.testing.assert_array_equal(taken_out(found).params[:, :2], taken_out(made).params[:, ::-1])
+    assert predicted_poses(found) == predicted_poses(made) > 0
