@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from facert.data.rig import Rig
+from facert.data.text import plural
 from facert.data.verdict import Verdict
 from facert.errors import InputError
 from facert.io.video_frames import VideoFrames
@@ -141,5 +142,6 @@ class PosePage(PoseEditing):
         )
         rest, labels = sum(shares.values()), self.session.labels
         others = f"; these frames would for {rest:.0%}" if shares else ""
-        covered = f"The {labels} labels stand for {1 - rest:.0%} of all frames{others}."
+        verb = "stands" if labels == 1 else "stand"
+        covered = f"{plural(labels, 'label')} {verb} for {1 - rest:.0%} of all frames{others}."
         self._takes.coverage.write(covered if labels else "")

@@ -196,5 +196,6 @@ def _idle(result: Take, model: TrainedModel, ranges: FloatArray) -> Iterator[Rea
         yield Reason("idle controls", "good", text, "pose frames that use them", none)
     still = names[(ranges > 0.0) & (np.ptp(result.params, axis=0) <= STILL * ranges)]
     if len(still):
-        text = f"{listed(still.tolist(), 3)} hardly move in this take"
+        verb = "moves" if len(still) == 1 else "move"
+        text = f"{listed(still.tolist(), 3)} hardly {verb} in this take"
         yield Reason("idle controls", "good", text, "none, if the actor does not either", none)

@@ -95,3 +95,24 @@ def test_a_result_that_cannot_be_written_is_refused_before_the_takes_are_read(fa
     assert done.code == 3
     assert "output's ending" in done.err
     assert not (folder / "out").exists()
+
+
+def test_an_empty_file_is_one_that_fails_and_the_poses_of_a_result_are_no_truth(
+    facert, folder
+):
+    out, model = folder / "out", folder / "model.safetensors"
+    (folder / "empty.csv").write_bytes(b"")
+    (folder / "shots.csv").write_text("shot,note\n010,good\n")
+    assert facert("retarget", folder / "take0.h5", folder / "shot.h5", "-m", model).code == 0
+    shot = api.read_take(folder / "shot.h5")
+    pose = f"{shot.controls.names[0]}={shot.params[3, 0] + 0.1}"
+    change = ("--frame", 3, "--set", pose, "-m", model, "--overwrite")
+    assert facert("correct", folder / "shot.h5", *change).code == 0
+    done = facert("retarget", folder, "--out-dir", out, "-m", model)
+    failed = [line for line in done.out.splitlines() if line.startswith("failed")]
+    assert len(failed) == 2
+    assert "broken.h5" in failed[0]
+    assert "empty.csv" in failed[1]
+    assert "shots.csv" in done.err
+    assert (out / "shot.h5").exists()
+    assert "RMS" not in done.out

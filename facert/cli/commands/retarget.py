@@ -166,7 +166,8 @@ def _retarget(
     frames, each = plural(len(take), "frame"), 1e3 * seconds / len(take)
     console.log.info("%s in %.2f s (%.3f ms a frame)", frames, seconds, each)
     console.show(f"wrote {output}")
-    _print_error(without_predicted(take), result, retargeter)
+    if take.corrections is None:  # else its poses are of a model, set right here and there
+        _print_error(without_predicted(take), result, retargeter)
     return verdict
 
 

@@ -71,7 +71,8 @@ def import_curves(
     time = [second - curves.time[0] for second in curves.time]
     _keep(scene, Timeline(curves.fps, list(enumerate(time))), list(curves.values))
     names = some(face.names, 4)
-    at = f"{len(curves.time)} frames at {curves.fps:g} frames/s on {rate:g} frames/s"
+    at = f"{len(curves.time)} frames at {curves.fps:g} frames/s"
+    at += "" if math.isclose(rate, curves.fps, rel_tol=1e-4) else f" in a scene of {rate:g}"
     return Report(f"{at}, keyed on {names}", [*face.warnings, *warnings])
 
 
