@@ -97,9 +97,7 @@ def test_a_result_that_cannot_be_written_is_refused_before_the_takes_are_read(fa
     assert not (folder / "out").exists()
 
 
-def test_an_empty_file_is_one_that_fails_and_the_poses_of_a_result_are_no_truth(
-    facert, folder
-):
+def test_an_empty_file_is_one_that_fails_and_the_poses_of_a_result_are_no_truth(facert, folder):
     out, model = folder / "out", folder / "model.safetensors"
     (folder / "empty.csv").write_bytes(b"")
     (folder / "shots.csv").write_text("shot,note\n010,good\n")
