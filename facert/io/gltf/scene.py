@@ -177,7 +177,7 @@ def local_parts(node: dict[str, Any]) -> tuple[FloatArray, FloatArray, FloatArra
         whole = scale.all()
         turn = matrix[:3, :3] / scale if whole else np.eye(3)
         return matrix[:3, 3], turn, np.diag(scale) if whole else matrix[:3, :3]
-    turn = Rotation.from_quat(node.get("rotation", [0.0, 0.0, 0.0, 1.0])).as_matrix()
+    turn = Rotation.from_quat(node["rotation"]).as_matrix() if "rotation" in node else np.eye(3)
     scale = np.array(node.get("scale", [1.0] * 3), dtype=np.float64)
     return np.array(node.get("translation", [0.0] * 3), dtype=np.float64), turn, np.diag(scale)
 
