@@ -42,7 +42,8 @@ def train(
     ----------
     take : Take, or sequence of Take
         With poses in some frames; of several takes of one actor, in some of them. Units, names and
-        the order of controls are matched to the first.
+        the order of controls are matched to the first. Of a frame that is posed in two takes of one
+        recording the pose of the last counts.
     settings : Settings, optional
         By default those of the start, else a blend of experts, see `facert.methods.blend`.
     monitor : Monitor, optional
