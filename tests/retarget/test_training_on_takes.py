@@ -88,7 +88,7 @@ def test_of_a_result_its_corrections_alone_are_learned_from(takes, truth, caplog
     assert "take 2: 37 poses predicted by a model, and not learned from" in caplog.text
     assert facert.train(corrected, PLAIN).labels == 3
     assert facert.train([takes[0], result], PLAIN).labels == 10
-    with pytest.raises(InputError, match="for all 80: a model predicted them"):
+    with pytest.raises(InputError, match="a model predicted all 80 of them"):
         facert.train([result, result], PLAIN)
 
 
