@@ -10,7 +10,8 @@ small weights (ridge regression), which leaves the residual
     r = (x - c) μ (AᵀA + μ I)⁻¹,      μ = λ tr(AᵀA) / l,
 
 zero where posed frames reach, and x - c where they never went. The residual of each marker is
-compared with how much it moves in the training take, posed or not.
+compared with how much it moves in the training take, posed or not. Of weights, it counts as far as
+they matter to the poses (`relevance`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.sides import counterparts
 from facert.data.take import SourceKind
 from facert.preprocess.motion.motion import Motion
 
@@ -29,6 +31,10 @@ STILL = 0.3
 """Markers that move less, in normalised units, are taken to move so much: of skin and noise."""
 NEW = 0.6
 """A frame is new when its residual is so much of the usual motion, RMS over markers."""
+TELLING = 5
+"""Fewer poses tell nothing of what matters: all does."""
+SHOWN = 0.5
+"""A weight was shown in posed frames that vary by this share of its usual variance there."""
 LEAST_SHARE = 0.05
 """Of all frames: with fewer new ones there is no warning."""
 NAMED, ALIKE = 3, 0.25
@@ -72,6 +78,40 @@ def relative_lengths(residuals: FloatArray, variance: FloatArray, kind: SourceKi
     lengths = np.linalg.norm(residuals.reshape(len(residuals), -1, size), axis=2)
     motion = np.sqrt(variance.reshape(-1, size).sum(axis=1))
     return np.asarray(lengths / np.maximum(motion, STILL))
+
+
+def relevance(
+    posed: FloatArray, poses: FloatArray, variance: FloatArray, names: Sequence[str]
+) -> FloatArray:
+    """How far what each weight does matters to the poses, (n,), from 0 to 1.
+
+    A gaze, or the angles of a head, may move a lot while no control of the character goes with it:
+    what it does in other frames is of no account. So a weight matters as far as the poses tell it,
+    by ridge regression from these with the row itself left out. One that posed frames hardly move
+    may be an expression that was not shown yet: it matters. Twins, of left and right, go together.
+
+    Parameters
+    ----------
+    posed, poses : arrays, shapes (l, n) and (l, P)
+        Normalised and complete.
+    variance : array, shape (n,)
+        Usual variance of each weight in the training take.
+    names : sequence of str
+        Of the weights.
+    """
+    centred, count = poses - poses.mean(axis=0), len(posed)
+    if count < TELLING:
+        return np.ones(len(names))
+    square = centred @ centred.T
+    ridge = max(RIDGE * float(np.trace(square)) / count, np.finfo(np.float64).tiny)
+    hat = np.linalg.solve(square + ridge * np.eye(count), square) + 1.0 / count
+    missed = np.square((posed - hat @ posed) / (1.0 - np.diag(hat))[:, None]).mean(axis=0)
+    whole = posed.var(axis=0) * (count / (count - 1)) ** 2  # likewise of the others' mean
+    twins = counterparts(names)
+    missed, whole, usual = (values + values[twins] for values in (missed, whole, variance))
+    told = 1.0 - np.divide(missed, whole, out=np.ones_like(whole), where=whole > 0.0)
+    moved = np.divide(whole, SHOWN * usual, out=np.zeros_like(whole), where=usual > 0.0)
+    return np.asarray(1.0 - np.minimum(moved, 1.0) * (1.0 - np.clip(told, 0.0, 1.0)))
 
 
 def over_names(amounts: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ what is left is new to the model.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from facert.retarget.novelty import (
     NEW,
     over_names,
     relative_lengths,
+    relevance,
     unexplained,
     usual_variance,
 )
@@ -109,26 +110,36 @@ def unlike(frames: FloatArray, model: TrainedModel) -> Unlike | None:
         return None
     kind = model.layout.kind
     posed = model.source_units.apply(model.labelled)
-    variance = usual_variance(posed, model.motion)
+    lengths = _relevant_lengths(posed, model)
     vectors = unexplained(frames, posed)
-    amounts = over_names(relative_lengths(vectors, variance, kind))
+    amounts = over_names(lengths(vectors))
     head, degrees = np.zeros(len(frames), dtype=np.bool_), np.zeros(len(frames))
     strange = bool((amounts > NEW).any())  # else the head is none either, and aligning takes time
     if strange and kind == "markers" and len(model.layout.names) >= HEAD_MARKERS:
         still, degrees, moved = _without_head(frames, posed, model)
-        without = over_names(relative_lengths(still, variance, kind))
-        steady = over_names(relative_lengths(vectors - np.median(vectors, axis=0), variance, kind))
+        without = over_names(lengths(still))
+        steady = over_names(lengths(vectors - np.median(vectors, axis=0)))
         better = without < np.minimum(EXPLAINED * amounts, steady + ANYWAY * amounts)
         head = moved & (amounts > NEW) & better
         vectors = np.where(head[:, None], still, vectors)
-    left = relative_lengths(vectors, variance, kind)
+    left = lengths(vectors)
     common = np.median(vectors, axis=0)
-    offset = relative_lengths(common[None], variance, kind)[0]
-    apart = relative_lengths(vectors - common, variance, kind)
+    offset = lengths(common[None])[0]
+    apart = lengths(vectors - common)
     most_of_it = over_names(apart) < EXPLAINED * over_names(left)
     placed = (over_names(left) > TILT) & most_of_it & (over_names(offset[None]) > TILT)
     left = np.where(placed[:, None], apart, left)
     return Unlike(amounts, left, head, placed, offset, degrees)
+
+
+def _relevant_lengths(posed: FloatArray, model: TrainedModel) -> Callable[[FloatArray], FloatArray]:
+    """What measures residuals (T, d_x) by marker, or by weight as far as it matters, (T, n)."""
+    kind, variance = model.layout.kind, usual_variance(posed, model.motion)
+    matter = np.ones(len(model.layout.names))
+    if kind == "weights":
+        poses = model.method.predict(posed).Y
+        matter = np.sqrt(relevance(posed, poses, variance, model.layout.names))
+    return lambda residuals: relative_lengths(residuals, variance, kind) * matter
 
 
 def _without_head(

@@ -7,7 +7,14 @@ import pytest
 import facert
 from facert import Settings
 from facert.io.formats import read_take_file
-from facert.retarget.novelty import NEW, novelty_warning, relative_residuals, usual_variance
+from facert.retarget.novelty import (
+    NEW,
+    novelty_warning,
+    relative_residuals,
+    relevance,
+    usual_variance,
+)
+from facert.retarget.source_reasons import unlike
 
 
 @pytest.fixture(scope="module")
@@ -124,3 +131,47 @@ def test_brows_are_new_to_a_model_of_cheeks(real_data, caplog):
     assert not warnings(caplog, model, cheeks)
     (warning,) = warnings(caplog, model, brows)
     assert "eyebrow" in warning
+
+
+@pytest.fixture(scope="module")
+def posed_weights():
+    """20 posed frames, normalised, and their poses of two controls, of what weights do.
+
+    Jaw and brow go with the poses; gaze moves as much without; a tongue was never out.
+    """
+    rng = np.random.default_rng(0)
+    jaw, brow, gaze, left = rng.normal(size=(4, 20))
+    still = 0.01 * rng.normal(size=(2, 20))
+    posed = np.stack([jaw, brow, gaze, 0.3 * left, still[0], still[1]], axis=1)
+    poses = np.stack([jaw + 0.1 * brow, brow], axis=1)
+    names = ("jawOpen", "browUp", "eyeLookLeft", "eyeLookRight", "tongueOut", "headYaw")
+    return posed, poses, names
+
+
+def test_a_weight_that_moves_without_the_poses_matters_little(posed_weights):
+    posed, poses, names = posed_weights
+    matter = relevance(posed, poses, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0]), names)
+    assert matter[:2].min() > 0.9
+    assert matter[2] < 0.4
+    assert matter[2] == matter[3]  # its twin hardly moved in these frames
+    assert matter[4] > 0.95  # may be an expression that nobody showed
+    assert matter[5] == 1.0
+    few = relevance(posed[:4], poses[:4], np.ones(6), names)
+    np.testing.assert_array_equal(few, 1.0)
+
+
+def test_a_gaze_of_which_no_control_knows_makes_no_frame_new(posed_weights):
+    posed, poses, names = posed_weights
+    names, time = names[:5], np.arange(60) / 30.0
+    rows = np.tile(np.column_stack([posed, poses]), (3, 1))
+    weights, params = 0.5 + 0.1 * rows[:, :5], 0.5 + 0.1 * rows[:, 6:]  # no headYaw
+    controls = facert.Controls(("a", "b"))
+    take = facert.Take(time, facert.Source(weights, names), controls, params)
+    model = facert.train(take, Settings(method="ridge", smooth=False))
+    frames = model.source_units.apply(weights)
+    amounts = []
+    for column in range(5):
+        other = frames.copy()
+        other[:, column] += 3.0
+        amounts.append(unlike(other, model).amounts.mean())
+    assert max(amounts[2:4]) < NEW < amounts[4]
