@@ -23,6 +23,7 @@ from facert.preprocess.motion.estimate import MotionEstimate
 from facert.preprocess.motion.pooled import PooledEstimate
 from facert.preprocess.preparation import TrainingData, training_data
 from facert.regions.learning import Learned, StartingModel, learn
+from facert.retarget.as_predicted import with_predicted
 from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
 
@@ -35,6 +36,7 @@ def train(
     monitor: Monitor | None = None,
     start: Retargeter | None = None,
     animation: Take | Sequence[Take] = (),
+    corrections_only: bool = False,
 ) -> Retargeter:
     """Learn to retarget from the labels of takes, their other frames, and animation.
 
@@ -54,6 +56,9 @@ def train(
         do. One of another form is not used, with a warning; other methods learn in one go anyway.
     animation : Take, or sequence of Take, optional
         Old animation of the character, as poses without a frame: poses of a take, or its weights.
+    corrections_only : bool
+        Of a corrected result beside other takes, learn from the corrections alone. Else from twice
+        as many of its other frames as predicted too, see `facert.retarget.as_predicted`.
 
     Raises
     ------
@@ -61,7 +66,7 @@ def train(
         When the takes have too few labels, source or poses that never change, or do not fit
         together.
     """
-    takes = _posed_by_somebody(as_takes(take, animation))
+    takes = _learned_from(as_takes(take, animation), corrections_only)
     if settings is None:
         settings = Settings() if start is None else replace(start.settings, labels=None)
     if settings.unlabelled is None:
@@ -95,21 +100,27 @@ def train(
     )
 
 
-def _posed_by_somebody(takes: Takes) -> Takes:
-    """The takes without the poses that a model predicted; refused where no others are there."""
-    if len(takes.parts) == 1:
-        check_poses(takes.parts[0])
-    else:
-        _warn_of_results(takes)
-    return posed_once(takes.with_parts([without_predicted(part) for part in takes.parts]))
+def _learned_from(given: Takes, corrections_only: bool) -> Takes:
+    """The takes with the poses to learn from: without those that a model predicted, but for a few.
+
+    Refused where no others are there.
+    """
+    counts = [predicted_poses(part) for part in given.parts]
+    if len(given.parts) == 1:
+        check_poses(given.parts[0])
+    elif sum(counts) and sum(counts) == given.labels:
+        raise _all_predicted(sum(counts))
+    takes = posed_once(given.with_parts([without_predicted(part) for part in given.parts]))
+    if len(given.parts) == 1:
+        return takes
+    _warn_of_results(given)
+    return takes if corrections_only else with_predicted(takes, given)
 
 
 def _warn_of_results(takes: Takes) -> None:
-    """Warn of takes with predicted poses, each by its file; refuse where all are predicted."""
-    counts = [predicted_poses(part) for part in takes.parts]
-    if sum(counts) and sum(counts) == takes.labels:
-        raise _all_predicted(sum(counts))
-    for (part, name), count in zip(takes.named, counts, strict=True):
+    """Warn of takes with predicted poses, each by its file."""
+    for part, name in takes.named:
+        count = predicted_poses(part)
         if count:
             own = plural(len(part.labels) - count, "other pose")
             text = "%s: %s predicted by a model, and not learned from; %s learned from"

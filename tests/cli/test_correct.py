@@ -319,7 +319,7 @@ def test_what_was_corrected_is_learned_from_as_if_it_were_posed_in_the_recording
     assert api.read_take("posed.h5").labels.tolist() == [17, 33]
     for other in ("shot", "posed"):
         asked = ("training.h5", f"{other}.h5", "-o", f"{other}.safetensors", "--method", "gpr")
-        done = facert("train", *asked)
+        done = facert("train", *asked, "--corrections-only")
         assert done.code == 0, done.err
     models = [api.load(f"{other}.safetensors") for other in ("shot", "posed")]
     assert models[0].labels == models[1].labels == 14

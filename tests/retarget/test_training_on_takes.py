@@ -77,12 +77,16 @@ def test_old_animation_is_learned_from_as_poses_without_a_frame(takes, truth) ->
     np.testing.assert_allclose(model.bounds[:, 1], truth.params.max(axis=0))
 
 
-def test_of_a_result_its_corrections_alone_are_learned_from(takes, truth, caplog) -> None:
+@pytest.fixture(name="result", scope="module")
+def _result(takes) -> Take:
     model = facert.train(takes[0], replace(PLAIN, method="gpr"))
-    result = model.retarget(replace(takes[1], params=None))
+    return model.retarget(replace(takes[1], params=None))
+
+
+def test_of_a_result_its_corrections_alone_are_learned_from(takes, truth, result, caplog) -> None:
     poses = truth.params[[45, 50, 60]]
     corrected = put_in(result, Corrections(np.array([5, 10, 20]), poses, 0.5))
-    again = facert.train([takes[0], corrected], PLAIN)
+    again = facert.train([takes[0], corrected], PLAIN, corrections_only=True)
     assert again.labels == 13
     np.testing.assert_array_equal(again.poses[-3:], poses)
     assert "take 2: 37 poses predicted by a model, and not learned from" in caplog.text
@@ -90,6 +94,38 @@ def test_of_a_result_its_corrections_alone_are_learned_from(takes, truth, caplog
     assert facert.train([takes[0], result], PLAIN).labels == 10
     with pytest.raises(InputError, match="a model predicted all 80 of them"):
         facert.train([result, result], PLAIN)
+
+
+def test_twice_as_many_frames_as_predicted_keep_corrections_in_their_place(
+    takes, truth, result, caplog
+) -> None:
+    caplog.set_level("INFO")
+    values = result.source.values.copy()
+    values[30:, :4] = np.nan  # these show too little
+    hidden = replace(result, source=replace(result.source, values=values))
+    corrected = put_in(hidden, Corrections([5], truth.params[[45]], 0.5))
+    model = facert.train([takes[0], corrected], PLAIN)
+    others = model.poses[-2:]
+    places = [int(np.abs(result.params - pose).sum(axis=1).argmin()) for pose in others]
+    assert len(set(places)) == 2
+    assert 5 + 0.25 * 30 < min(places) < max(places) < 30
+    assert "take 2: but 2 of them, so that 1 correction does not stand for" in caplog.text
+    assert "--corrections-only" in caplog.text
+
+
+def test_confirmed_frames_count_among_those_as_predicted(takes, truth, result) -> None:
+    poses = np.vstack([truth.params[45], result.params[30]])
+    corrected = put_in(result, Corrections([5, 30], poses, 0.5))
+    assert facert.train([takes[0], corrected], PLAIN).labels == 13
+    confirmed = put_in(result, Corrections([30], result.params[[30]], 0.5))
+    assert facert.train([takes[0], confirmed], PLAIN).labels == 11
+
+
+def test_a_pose_of_the_recording_counts_and_not_what_was_predicted(takes, truth, result) -> None:
+    corrected = put_in(result, Corrections([5], truth.params[[45]], 0.1))
+    recording = replace(result, std=None, corrections=None, model="", params=truth.params[40:])
+    model = facert.train([takes[0], recording, corrected], PLAIN)
+    assert model.labels == 10 + 40
 
 
 def test_a_slip_among_labels_is_named_with_its_file(takes, caplog) -> None:

@@ -78,7 +78,7 @@ def command(
     """Correct poses of a result; they are blended over time, kept, and learned from.
 
     What is set is met exactly, and the other controls of the frame follow as in facert pose --from.
-    retarget puts the corrections in again, and train learns from them and from nothing predicted.
+    retarget puts the corrections in again, and train learns from them.
 
     facert correct retargeted.h5 --frame 40 --set smile=0.6 --overwrite
     facert correct retargeted.h5 --list

@@ -83,6 +83,13 @@ def command(
     predicted: Annotated[
         bool, option("Learn from poses that a model predicted as well.", "--allow-predicted")
     ] = False,
+    corrections_only: Annotated[
+        bool,
+        option(
+            "Learn from no frames as predicted beside the corrected ones of a result.",
+            "--corrections-only",
+        ),
+    ] = False,
     animation: Annotated[
         list[Path] | None,
         file_option(
@@ -148,7 +155,9 @@ def command(
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
     with reading(listed_files(paths)), ProgressBar() as bar:
-        retargeter = facert.train(takes, settings, Monitors(*monitors, bar), begin)
+        retargeter = facert.train(
+            takes, settings, Monitors(*monitors, bar), begin, corrections_only=corrections_only
+        )
     retargeter = replace(retargeter, takes=tuple(path.name for path in paths))
     retargeter.save(output, overwrite_model)
     status = retargeter.figures.get("status")
