@@ -84,7 +84,7 @@ def test_poses_that_a_model_predicted_are_no_labels(facert, make_take, tmp_path:
     package.write_take(replace(posed, std=np.full((20, 4), 0.1)), result)
     refused = facert("convert", take, tmp_path / "out.h5", "--poses", result)
     assert refused.code == 3
-    assert "a model predicted them" in refused.err
+    assert "a model predicted all" in refused.err
     table = tmp_path / "result.csv"
     assert facert("convert", result, table).code == 0  # the way out that the message names
     assert facert("convert", take, tmp_path / "out.h5", "--poses", table).code == 0
