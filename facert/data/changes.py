@@ -105,7 +105,9 @@ def _posed(take: Take, changes: Changes) -> Take:
         poses = None if poses is None else poses.of_character(controls)
     if poses is not None:
         take = labelled(take, poses)
-    return with_limits(take, changes.limits) if poses or controls or changes.limits else take
+    if poses or controls or changes.limits:
+        return with_limits(take, changes.limits, of_rig=controls is not None)
+    return take
 
 
 def _start_timecode(start: str, fps: float) -> str:

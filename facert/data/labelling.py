@@ -130,7 +130,8 @@ def _places(names: Sequence[str], controls: Controls, field: str) -> list[list[i
             field,
             f"controls of the character ({len(controls.names)})",
             f"{unknown[0]!r}, which it has not{others}",
-            f"{fix}Correct the name, or leave out --rig: then any names count.",
+            f"{fix}Correct the name; if it moves a bone or an object, give --drivers as well; or "
+            "leave out --rig: then any names count.",
         )
     taken: dict[int, str] = {}
     for name, found in zip(names, places, strict=True):

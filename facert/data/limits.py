@@ -20,10 +20,14 @@ log = logging.getLogger("facert")
 
 SHARE = (0.0, 1.0)
 """What shapes are limited to, and every control whose poses stay within."""
+SIGNED = (-1.0, 1.0)
+"""What a control that drives a bone is limited to, if its poses go below 0."""
 UNLIMITED = (-np.inf, np.inf)
 NO_LIMITS = "none"
 OVERDRIVEN = 2.0
 """A pose beyond a limit that nobody stated is meant so, up to this many times the limit."""
+SEVERAL = 2
+"""So many poses farther beyond are no slips: the control is counted otherwise, and not widened."""
 SLACK = 1e-6  # of the limits: what a float32 is off by
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -63,18 +67,21 @@ def _stated(text: str) -> StatedLimits:
 def rig_controls(rig: Rig, drivers: Sequence[str] = ()) -> Controls:
     """The controls of a rig with their limits: its shapes, which go from 0 to 1.
 
-    So do controls that drive something else, by the names in `drivers`.
+    Controls that drive something else, by the names in `drivers`, have none: nothing states them.
     """
     index = NameIndex.among(rig.names, list(drivers), "--drivers", quiet=True)
     names = (*rig.names, *(name for name in drivers if index.find(name) is None))
-    return Controls(names, np.tile(SHARE, (len(names), 1)))
+    driven = len(names) - len(rig.names)
+    limits = np.vstack([np.tile(SHARE, (len(rig.names), 1)), np.tile(UNLIMITED, (driven, 1))])
+    return Controls(names, limits)
 
 
-def with_limits(take: Take, stated: Sequence[StatedLimits] = ()) -> Take:
+def with_limits(take: Take, stated: Sequence[StatedLimits] = (), of_rig: bool = False) -> Take:
     """A take whose controls have limits: those stated, else those that it has.
 
     Of a take without any, controls whose poses stay within 0 and 1 are limited to that, and the
-    log says so. Limits that nobody stated are widened to poses that go a little beyond them.
+    log says so. Limits that nobody stated are widened to poses that go a little beyond them. With
+    those `of_rig`, controls without any are driven, and limited to -1..1 where poses go below 0.
 
     Raises `InputError` for stated limits of a control that there is not.
     """
@@ -89,6 +96,8 @@ def with_limits(take: Take, stated: Sequence[StatedLimits] = ()) -> Take:
     limits = take.controls.limits
     if limits is None:
         limits = _shown(names, known, given)
+    elif of_rig:
+        limits = _of_driven(names, limits, known, given)
     limits = _widened(names, limits, known, given)
     controls = Controls(names, np.where(given[:, None], asked, limits))
     return replace(take, controls=controls)
@@ -155,12 +164,36 @@ def _shown(names: Sequence[str], poses: FloatArray, given: BoolArray) -> FloatAr
     return limits
 
 
+def _of_driven(
+    names: Sequence[str], limits: FloatArray, poses: FloatArray, given: BoolArray
+) -> FloatArray:
+    """Limits (P, 2) with those of driven controls by the poses (n, P), which the log names.
+
+    A control that goes both ways has the same limit on either side, however its poses lie.
+    """
+    reach = np.abs(poses).max(axis=0, initial=0.0)
+    found = np.isinf(limits).all(axis=1) & ~given & (reach > 0.0) & (reach <= OVERDRIVEN)
+    signed = (poses < 0.0).any(axis=0)
+    result = limits.copy()
+    for chosen, (low, high) in ((found & ~signed, SHARE), (found & signed, SIGNED)):
+        result[chosen] = low, high
+        if chosen.any():
+            of_them = listed([names[i] for i in np.flatnonzero(chosen)])
+            log.info(
+                "driven, and limited to %g..%g by their poses: %s; --limits NAME=LO..HI says "
+                "otherwise",
+                *(low, high, of_them),
+            )
+    return result
+
+
 def _widened(
     names: Sequence[str], limits: FloatArray, poses: FloatArray, given: BoolArray
 ) -> FloatArray:
     """Limits (P, 2) that let in poses (n, P) a little beyond them, which the log names."""
     away = beyond(limits, poses)
-    meant = ~given & (away > 0.0) & (away <= (OVERDRIVEN - 1.0) * _reach(limits))
+    near = away <= (OVERDRIVEN - 1.0) * _reach(limits)
+    meant = ~given & (away > 0.0) & near & ((~near).sum(axis=0) < SEVERAL)
     if not meant.any():
         return limits
     low = np.minimum(limits[:, 0], np.where(meant, poses, np.inf).min(axis=0))

@@ -212,9 +212,15 @@ def _names_key(key: str, archive: Archive) -> str:
 
 
 def _choose(present: list[str], asked: str | None, option: str) -> str | None:
-    """The key that was asked for, or the only one; None when there is none."""
+    """The key that was asked for, or the only one; None when there is none.
+
+    A rig's `unit_deltas` are the shapes of a track's `units`: either word will do for both.
+    """
     if asked in present:
         return asked
+    alike = [key for key in present if asked and key.rstrip("s") == asked.rstrip("s")]
+    if len(alike) == 1:
+        return alike[0]
     if asked is None and len(present) < 2:
         return present[0] if present else None
     found = "none" if asked is None else repr(asked)

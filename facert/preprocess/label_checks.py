@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.data.limits import beyond, known_poses_of
+from facert.data.limits import SEVERAL, beyond, known_poses_of
 from facert.data.spelling import words
 from facert.data.take import Take
 from facert.data.text import listed, plural
@@ -38,12 +38,28 @@ FEW = 0.1
 PILED, PILE = 3, 0.25
 """So many poses, and this share of those that move a control, at its very highest value; and half
 of them where that is its end anyway."""
+TINY = 0.25
+"""So far, as a share of what is usual, goes a control whose values are alike by rounding alone."""
 GRID = 0.05
 """Values that people set by hand are multiples of this."""
+_PERCENT = (
+    "in percent, it seems, where the limits are those of fractions, 0 to 1: %(shown)s; divide by "
+    "100"
+)
+_EITHER = (
+    "in percent or degrees among fractions, it seems: %(shown)s; divide percent by 100 and degrees "
+    "by the largest angle, or, if this is how the rig counts, say so: facert convert --limits "
+    "'%(first)s'"
+)
+_DEGREES = (
+    "angles among shares: %(shown)s; the others are learned a little better when all have like "
+    "ranges; with facert convert --limits '%(first)s' they pass without a word"
+)
 _ANGLES = frozenset({
     "angle", "angles", "deg", "degree", "degrees", "euler", "orient", "pitch", "roll", "rot",
     "rotate", "rotation", "yaw", "rx", "ry", "rz", "rotx", "roty", "rotz",
 })  # fmt: skip
+_LIPS = frozenset({"mouth", "lip", "lips"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +88,8 @@ def warn_of_labels(take: Take, name_of: Callable[[int], str] = str) -> None:
     controls, values = take.controls, take.params[take.labels]
     frames = [name_of(frame) for frame in take.labels.tolist()]
     labels = _Labels(controls.names, frames, values, controls.limits, take.animation)
-    rows, columns = _rows_in_percent(labels), _large_columns(labels)
+    rows = _rows_in_percent(labels)
+    columns = _large_columns(labels, rows)
     _warn_of_rows(labels, rows)
     _warn_of_columns(labels, columns)
     seen = rows[:, None] | columns
@@ -81,19 +98,23 @@ def warn_of_labels(take: Take, name_of: Callable[[int], str] = str) -> None:
     _name_unmoved(take)
 
 
-def _large_columns(labels: _Labels) -> BoolArray:
-    """Controls in percent or degrees where most are shares, (P,): all their values are large.
+def _large_columns(labels: _Labels, rows: BoolArray) -> BoolArray:
+    """Controls in percent or degrees where most are shares, (P,), but for the poses in `rows`.
 
-    Where limits say that a control is a share, it is one whatever the others are.
+    Several of their values are no shares, and one at least is large: a face is mostly at rest, and
+    a jaw that is hardly open is at 1 percent as well. A single such value may be a slip.
     """
-    sizes = labels.sizes
-    highest = sizes.max(axis=0)
-    shares = (highest > 0.0) & (highest <= SHARES)
-    large = (highest > BIG) & (_own(sizes) > SHARES)
-    widest = _widest(labels.limits)
-    large &= highest > widest
-    if shares.sum() < MOST * (highest > 0.0).sum():
-        large &= (widest > 0.0) & (widest <= SHARE)
+    sizes = np.where(rows[:, None], 0.0, labels.sizes)
+    highest, widest = sizes.max(axis=0), _widest(labels.limits)
+    moving, fractions = highest > 0.0, (widest > 0.0) & (widest <= SHARES)
+    shares = moving & ((highest <= SHARES) | fractions)
+    reach = np.where(fractions, SHARES * widest, np.maximum(BIG, widest))
+    large = (highest > reach) & ((sizes > SHARES).sum(axis=0) >= SEVERAL)
+    if not large.any() or shares.sum() < MOST * moving.sum():
+        return np.zeros(len(highest), dtype=np.bool_)
+    large |= highest > reach  # where several controls are in percent, one value is no slip
+    if large.sum() > MOST * moving.sum():
+        large |= fractions & (highest > FULL)
     return np.asarray(large)
 
 
@@ -112,6 +133,7 @@ def _rows_in_percent(labels: _Labels) -> BoolArray:
         return none
     counts = percent[:, mixed].sum(axis=1)
     found = (counts >= OFTEN) & (counts > shares[:, mixed].sum(axis=1))
+    found &= (sizes > FULL).sum(axis=1) > MOST * (sizes > 0.0).sum(axis=1)
     others = shares[~found].any(axis=1)
     return np.asarray(found) if others.any() else none
 
@@ -131,31 +153,34 @@ def _warn_of_rows(labels: _Labels, rows: BoolArray) -> None:
 
 
 def _warn_of_columns(labels: _Labels, columns: BoolArray) -> None:
-    """Warn of controls in percent or degrees; those that are angles by their names are named."""
+    """Warn of controls in percent or degrees; those that are angles by their names are named.
+
+    Where the limits say that a control is a share, it is in percent.
+    """
     highest = labels.values[labels.sizes.argmax(axis=0), np.arange(len(labels.names))]
-    angles = np.array([bool(_ANGLES & set(words(name))) for name in labels.names])
+    angles = np.array([_is_angle(name) for name in labels.names])
+    widest = np.broadcast_to(_widest(labels.limits), angles.shape)
+    stated = (widest > 0.0) & (widest <= SHARES)
     for found, text, level in (
-        (
-            columns & ~angles,
-            "in percent or degrees, it seems, where most controls are within 0 and 1: %s; divide "
-            "percent by 100 and degrees by the largest angle, or, if this is how the rig counts, "
-            "say so: facert convert --limits %s",
-            logging.WARNING,
-        ),
-        (
-            columns & angles,
-            "angles among shares: %s; the others are learned a little better when all have like "
-            "ranges; with facert convert --limits %s they pass without a word",
-            logging.INFO,
-        ),
+        (columns & stated, _PERCENT, logging.WARNING),
+        (columns & ~stated & ~angles, _EITHER, logging.WARNING),
+        (columns & ~stated & angles, _DEGREES, logging.INFO),
     ):
         if found.any():
-            places = np.flatnonzero(found)
+            farthest = np.argsort(-np.abs(highest), kind="stable")
+            places = farthest[found[farthest]]
             shown = listed([f"{labels.names[i]} up to {highest[i]:.4g}" for i in places])
             first = places[0]
             far = np.ceil(abs(highest[first]) / 10.0) * 10.0
             limits = f"{-far if labels.values[:, first].min() < 0 else 0:g}..{far:g}"
-            log.log(level, text, shown, f"'{labels.names[first]}={limits}'")
+            example = f"{labels.names[first]}={limits}"
+            log.log(level, text, {"shown": shown, "first": example})
+
+
+def _is_angle(name: str) -> bool:
+    """Whether a control is an angle by its name; lips that roll in are none."""
+    there = set(words(name))
+    return bool(_ANGLES & there) and not _LIPS & there
 
 
 def _warn_of_slips(labels: _Labels, seen: BoolArray) -> None:
@@ -165,15 +190,21 @@ def _warn_of_slips(labels: _Labels, seen: BoolArray) -> None:
     if labels.animation is not None and len(labels.animation):
         reach = np.maximum(reach, np.abs(labels.animation).max(axis=0))
     absurd = (sizes > reach) & ~seen
-    for row, control in np.argwhere(absurd)[:NAMED].tolist():
+    for control in np.flatnonzero(absurd.any(axis=0))[:NAMED].tolist():
+        row = int(np.where(absurd[:, control], sizes[:, control], 0.0).argmax())
+        more = int(absurd[:, control].sum()) - 1
+        value = labels.values[row, control]
+        share = BIG <= abs(value) <= PERCENT and reach[control] <= ABSURD * SHARES
         log.warning(
-            "the pose of frame %s has %s at %.3g, many times as much as other poses and controls:"
-            " correct it if it is a slip",
-            *(labels.frames[row], labels.names[control], labels.values[row, control]),
+            "the pose of frame %s%s has %s at %.3g, many times as much as other poses and controls:"
+            " correct it if it is a slip%s",
+            *(labels.frames[row], f" (and {plural(more, 'other')})" if more else ""),
+            *(labels.names[control], value),
+            f", such as percent for {value / PERCENT:.3g}" if share else "",
         )
     if labels.limits is None:
         return
-    outside = np.where(absurd | seen, 0.0, beyond(labels.limits, labels.values))
+    outside = np.where(absurd.any(axis=0) | seen, 0.0, beyond(labels.limits, labels.values))
     for control in np.flatnonzero(outside.any(axis=0))[:NAMED].tolist():
         row, (low, high) = int(outside[:, control].argmax()), labels.limits[control]
         value = labels.values[row, control]
@@ -188,9 +219,11 @@ def _warn_of_slips(labels: _Labels, seen: BoolArray) -> None:
 
 def _warn_of_plateaus(labels: _Labels, skipped: BoolArray) -> None:
     """Warn of controls whose highest value, though no limit, many poses share to the digit."""
+    highest = labels.sizes.max(axis=0)
+    low = TINY * float(quantile(highest[highest > 0.0], LARGE)) if highest.any() else 0.0
     within: list[str] = []
     at_end: list[str] = []
-    for control in np.flatnonzero(~skipped).tolist():
+    for control in np.flatnonzero(~skipped & (highest > low)).tolist():
         found = _plateau(labels.values[:, control])
         if found is not None:
             count, used, high = found

@@ -99,7 +99,7 @@ def test_poses_in_percent_are_warned_of_when_they_come_in(facert, files) -> None
     output = capture.with_name("posed.h5")
     done = facert("convert", capture, output, "--poses", poses, "--rig", rig)
     assert done.code == 0
-    assert "warning: in percent or degrees" in done.err
+    assert "warning: in percent, it seems" in done.err
     assert "mouthSmile_L up to 70" in done.err
 
 

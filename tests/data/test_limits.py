@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from facert import Settings, load, train
 from facert.data.facts import facts_of
-from facert.data.limits import UNLIMITED, bounds_of, parse_limits, with_limits
+from facert.data.limits import UNLIMITED, bounds_of, parse_limits, rig_controls, with_limits
+from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 
@@ -71,6 +73,25 @@ def test_an_overdriven_shape_widens_its_limit_but_no_slip_does(caplog) -> None:
     assert "widened to poses beyond them: jaw 0..1.2, smile_R -0.2..1, brow -0.3..1" in caplog.text
     stated = with_limits(take, parse_limits(["0..1"])).controls.limits
     assert stated.tolist() == [[0, 1]] * 4
+
+
+def test_driven_controls_have_the_same_limit_on_either_side(caplog) -> None:
+    rig = Rig(np.eye(3), np.zeros((1, 3, 3)), ("smile",), [[0, 1, 2]])
+    controls = rig_controls(rig, ("eyeYaw", "jaw", "turn"))
+    assert controls.limits.tolist() == [[0, 1], *[list(UNLIMITED)] * 3]
+    values = np.array([[0.1, -0.57, 0.0, 5.0], [0.9, 0.2, 0.7, 30.0]])
+    take = posed(values)
+    take = replace(take, controls=controls)
+    found = with_limits(take, parse_limits(["jaw=0..0.8"]), of_rig=True).controls.limits
+    assert found.tolist() == [[0, 1], [-1, 1], [0, 0.8], list(UNLIMITED)]
+    assert "driven, and limited to -1..1 by their poses: eyeYaw; --limits" in caplog.text
+    assert with_limits(take).controls.limits[1].tolist() == list(UNLIMITED)
+
+
+def test_a_control_with_several_poses_far_beyond_is_not_widened(caplog) -> None:
+    found = with_limits(posed([[1.6, 0, 0, 0], [35, 0, 0, 1], [20, 0, 0, 0]], [[0, 1]] * 4))
+    assert found.controls.limits.tolist() == [[0, 1]] * 4
+    assert "widened" not in caplog.text
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,7 @@ def test_one_of_several_sets_of_shapes_is_chosen(path):
     assert read_npz_rig(path).names == ("d",)
     np.savez(path, **RIG, a_deltas=one, a_names=["x"], b_deltas=two, b_names=["y", "z"])
     assert read_npz_rig(path, shapes="b").names == ("y", "z")
+    assert read_npz_rig(path, shapes="bs").names == ("y", "z")  # as a track calls its target
     with pytest.raises(InputError, match="one of: a, b"):
         read_npz_rig(path)
     assert npz.kind_of(path) == "rig"

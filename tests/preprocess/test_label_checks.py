@@ -52,7 +52,51 @@ def test_poses_all_in_percent_are_known_by_the_limits_of_the_rig(shares, logged)
     """Without limits they are a rig that counts so."""
     assert logged(100 * shares) == []
     (line,) = logged(100 * shares, limits=(0.0, 1.0))
-    assert line.startswith("in percent or degrees")
+    assert line.startswith("in percent, it seems")
+
+
+@pytest.fixture(name="mostly_shut")
+def _mostly_shut(shares) -> np.ndarray:
+    """The same with a jaw in percent that is open in three poses."""
+    shares[:, 0] = [1.3, 0.7, 0.9, 23.8, 10.4, 35.6, 0, 0.2, 0, 0.2, 0, 0.3, 0.4, 0, 1.6, 2.3]
+    return shares
+
+
+def test_a_jaw_that_is_mostly_shut_is_named_percent_in_one_line(mostly_shut, logged) -> None:
+    (line,) = logged(mostly_shut)
+    assert line.startswith("in percent or degrees among fractions, it seems: jawOpen up to 35.6;")
+    (line,) = logged(mostly_shut, limits=(0.0, 1.0))
+    assert line.startswith("in percent, it seems")
+    assert "jawOpen up to 35.6; divide by 100" in line
+    assert "--limits" not in line
+    names = ("mouthRollUpper", *NAMES[1:])
+    assert logged(mostly_shut, names=names)[0].startswith("in percent or degrees")
+
+
+def test_poses_that_are_all_in_percent_are_named_once_where_the_rig_goes_to_1(
+    shares, logged
+) -> None:
+    shares[:, 7] = 0
+    shares[3, 7] = 0.02
+    (line,) = logged(100 * shares, limits=(0.0, 1.0))
+    assert line.startswith("in percent, it seems")
+    assert "and 3 more; divide by 100" in line
+
+
+def test_slips_of_a_control_are_one_line_which_says_what_they_are_as_percent(
+    shares, logged
+) -> None:
+    shares[5, 2], shares[6, 2] = 0.0, 35.0
+    (line,) = logged(shares)
+    assert "frame 6 has smile_R at 35, " in line
+    assert line.endswith("if it is a slip, such as percent for 0.35")
+    (line,) = logged(shares, limits=(0.0, 1.0))
+    assert "percent for 0.35" in line
+
+
+def test_a_control_that_hardly_moves_is_not_cut_off(shares, logged) -> None:
+    shares[:, 4] = np.minimum(shares[:, 4], 0.4).round(2) / 10
+    assert logged(shares) == []
 
 
 @pytest.mark.parametrize("rows", [[4], [0, 3, 5, 6, 9, 11, 12, 15]])
