@@ -178,7 +178,7 @@ def _of_driven(
     for chosen, (low, high) in ((found & ~signed, SHARE), (found & signed, SIGNED)):
         result[chosen] = low, high
         if chosen.any():
-            of_them = listed([names[i] for i in np.flatnonzero(chosen)])
+            of_them = listed([names[i] for i in np.flatnonzero(chosen).tolist()])
             log.info(
                 "driven, and limited to %g..%g by their poses: %s; --limits NAME=LO..HI says "
                 "otherwise",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from shlex import quote
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
 from facert.data.resampling import PAUSE
 from facert.data.take import Take
-from facert.data.text import listed, plural
+from facert.data.text import listed, plural, printable
 from facert.data.verdict import Reason
 from facert.retarget.model import TrainedModel
 from facert.retarget.reasons import found_in, level_of, most
@@ -91,13 +92,26 @@ def _clipped(
     worst = int(shares.argmax())
     names = most(shares, model.controls.names)
     text = f"{names} cut flat, by up to {farthest[worst]:.0%} of the range, "
-    declared = model.controls.limits is not None
-    cure = "the rig's limits are reached: widen them, or a gain below 1 by --controls"
-    if not declared:
-        cure = "pose the strongest expression as well, or train with --limits none"
+    frame = int(np.where(cut[:, worst], beyond[:, worst], -1.0).argmax())
+    cure = _cure_of_clipped(result, model, frame, worst)
     level = level_of(float(mask.mean()), *CLIPPED)
     text += found_in(mask, result.time)
     yield Reason("clipped controls", level, text, cure, np.flatnonzero(mask))
+
+
+def _cure_of_clipped(result: Take, model: TrainedModel, frame: int, control: int) -> str:
+    """What helps a control that is cut in a frame: by a limit, or where its poses end."""
+    assert result.params is not None and model.bounds is not None  # it is cut
+    bounds, limits = model.bounds[control], model.controls.limits
+    end = int(np.abs(bounds - result.params[frame, control]).argmin())
+    slack, name = REACHED * float(np.ptp(bounds)), printable(model.controls.names[control])
+    if limits is not None and abs(limits[control, end] - bounds[end]) <= slack:
+        low, high = limits[control]
+        limit = f"its limit {low:g}..{high:g}, of the rig, stated, or guessed from the poses, is "
+        wider = f"facert convert --limits {quote(f'{name}=LO..HI')}"
+        return f"{limit}reached: widen it by {wider} and train, or a gain below 1 by --controls"
+    pose = f"no pose goes farther: pose frame {frame} of this take, where {name} "
+    return f"{pose}goes farthest, or train with --limits none"
 
 
 def beyond_bounds(result: Take, model: TrainedModel) -> FloatArray | None:

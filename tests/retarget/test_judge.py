@@ -101,9 +101,27 @@ def test_a_control_that_is_cut_flat_is_named_with_its_frames(model, shot):
     reason = the("clipped controls", judged(model, moved(shot, larger)))
     assert reason.level == "look at it"
     assert "--limits none" in reason.cure
+    assert "no pose goes farther: pose frame " in reason.cure
+    assert int(reason.cure.split("pose frame ")[1].split()[0]) in reason.frames
     result = model.retarget(moved(shot, larger))
     at_bound = (result.params[:, None] == model.bounds.T).any(axis=(1, 2))
     assert at_bound[reason.frames].all()
+
+
+def test_a_control_cut_at_its_limit_is_told_from_one_whose_poses_end(shot, pose_few) -> None:
+    few = pose_few(shot, 15)
+    poses = few.params[few.labels]
+    far = np.ptp(poses, axis=0)
+    rest = shot.source.values.mean(axis=0)
+    larger = moved(shot, rest + 2.5 * (shot.source.values - rest))
+    cures = []
+    for margin in (0.05, 5.0):
+        limits = np.stack([poses.min(axis=0) - margin * far, poses.max(axis=0) + margin * far], 1)
+        limited = replace(few, controls=replace(few.controls, limits=limits))
+        model = facert.train(limited, Settings(method="ridge"))
+        cures.append(the("clipped controls", judged(model, larger)).cure)
+    assert "facert convert --limits" in cures[0]
+    assert "no pose goes farther" in cures[1]
 
 
 def test_a_bad_marker_is_named_with_its_share(model, shot):
