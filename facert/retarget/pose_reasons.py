@@ -101,15 +101,16 @@ def _clipped(
 
 def _cure_of_clipped(result: Take, model: TrainedModel, frame: int, control: int) -> str:
     """What helps a control that is cut in a frame: by a limit, or where its poses end."""
-    assert result.params is not None and model.bounds is not None  # it is cut
+    assert result.params is not None
+    assert model.bounds is not None  # it is cut
     bounds, limits = model.bounds[control], model.controls.limits
     end = int(np.abs(bounds - result.params[frame, control]).argmin())
     slack, name = REACHED * float(np.ptp(bounds)), printable(model.controls.names[control])
     if limits is not None and abs(limits[control, end] - bounds[end]) <= slack:
         low, high = limits[control]
-        limit = f"its limit {low:g}..{high:g}, of the rig, stated, or guessed from the poses, is "
+        where = f"{name} reaches its limit {low:g}..{high:g} (the rig's, stated, or guessed)"
         wider = f"facert convert --limits {quote(f'{name}=LO..HI')}"
-        return f"{limit}reached: widen it by {wider} and train, or a gain below 1 by --controls"
+        return f"{where}: widen it by {wider} and train, or a gain below 1 by --controls"
     pose = f"no pose goes farther: pose frame {frame} of this take, where {name} "
     return f"{pose}goes farthest, or train with --limits none"
 
