@@ -12,7 +12,7 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.io.gltf.document import open_gltf
 from facert.io.rig import write_rig
-from facert.io.take import write_take
+from facert.io.take import read_take, write_take
 from facert.mesh.morphs import Morphs
 
 FACE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) / 10
@@ -70,6 +70,22 @@ def test_drivers_are_for_files_with_bones(facert, folder: Path) -> None:
     (folder / "drivers.toml").write_text(TABLE.replace("look", "loook"))
     refused = facert("convert", take, out, "--rig", folder / "character.glb", *drivers)
     assert (refused.code, out.exists()) == (3, False)
+
+
+def test_poses_of_a_bone_come_in_with_the_drivers(facert, folder: Path) -> None:
+    poses, out = folder / "poses.csv", folder / "posed.h5"
+    poses.write_text("frame,smile,look\n0,0,0\n1,0.5,-0.57\n2,1,0.3\n")
+    command = ("convert", folder / "take.csv", out, "--poses", poses)
+    (folder / "take.csv").write_text("time,a.x,a.y,a.z\n0,1,2,3\n.02,1,2,4\n.04,1,3,4\n")
+    refused = facert(*command, "--rig", folder / "character.glb")
+    said = " ".join(refused.err.split())
+    assert (refused.code, "'look', which it has not" in said) == (3, True)
+    assert "if it moves a bone or an object, give --drivers as well" in said
+    given = ("--rig", folder / "character.glb", "--drivers", folder / "drivers.toml")
+    done = facert(*command, *given)
+    assert done.code == 0, done.err
+    assert "limited to -1..1 by their poses: look" in done.err
+    assert read_take(out).controls.limits.tolist() == [[0, 1], [-1, 1]]
 
 
 def test_a_character_alone_is_copied(facert, folder: Path) -> None:
