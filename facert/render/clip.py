@@ -103,9 +103,10 @@ def _side_by_side(columns: Sequence[tuple[str, Pixels]], label: str) -> Pixels:
     pixels = len(columns[0][1])
     sheet = Image.new("RGB", (pixels * len(columns), pixels + CAPTION), "white")
     text, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
-    for place, (name, picture) in enumerate(columns):
+    names = [name for name, _ in columns]
+    names[0] = f"{label}   {names[0]}"
+    for place, (name, (_, picture)) in enumerate(zip(names, columns, strict=True)):
         sheet.paste(Image.fromarray(picture), (place * pixels, 0))
         middle = (place * pixels + pixels // 2, pixels + CAPTION // 2)
         text.text(middle, name, INK, font, anchor="mm")
-    text.text((8, 8), label, INK, font, stroke_width=2, stroke_fill="white")
     return np.asarray(sheet)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,7 +24,7 @@ from facert.io.rig import read_rig
 from facert.io.verdict import read_verdict
 from facert.pages.report.evaluation_section import read_evaluation
 from facert.pages.report.performance_section import fits, performance_section, truth_among
-from facert.pages.report.sections import Section
+from facert.pages.report.sections import Section, Table
 from facert.retarget.model import TrainedModel
 from facert.retarget.verdict import judge
 
@@ -96,15 +96,24 @@ def folder_sections(
     curves += _files(folder, ".csv")
     takes += [path for path in curves if path.stem.removesuffix(".livelink") not in stems]
     known = [rig] if rig is not None else list(_read(rigs, read_rig).values())
+    unread: dict[Path, str] = {}
     sections = (
         *_read(evaluations, read_evaluation).values(),
-        *_performances(_read(takes, read_performance), known, truth, model),
-        *_read(_files(folder, ".safetensors"), _model).values(),
+        *_performances(_read(takes, read_performance, unread), known, truth, model),
+        *_read(_files(folder, ".safetensors"), _model, unread).values(),
     )
     if not sections:
         expected = "what eval --json or retarget wrote, or models"
         raise InputError("folder", expected, "none", "Give another folder.", where=str(folder))
-    return sections
+    return (*_unread(unread), *sections)
+
+
+def _unread(found: Mapping[Path, str]) -> Iterator[Section]:
+    """The files that could not be read, and why."""
+    if found:
+        rows = tuple((path.name, text) for path, text in found.items())
+        table = Table("Files that could not be read", ("file", "why"), rows, words=True)
+        yield Section("Left out", tables=(table,))
 
 
 def read_performance(path: Path) -> Take:
@@ -180,19 +189,23 @@ def _files(folder: Path, *endings: str) -> list[Path]:
 
 
 def _stated(path: Path) -> str:
-    """The format that an HDF5 file states."""
+    """The format that an HDF5 file states; that of takes for one that is damaged."""
     try:
         return stated_format(path)
     except InputError:
-        return ""
+        return TAKE_FORMAT  # who reads it says what is wrong
 
 
-def _read(paths: list[Path], read: Callable[[Path], Thing]) -> dict[Path, Thing]:
-    """Read some files; those that cannot be read are named in the log and skipped."""
+def _read(
+    paths: list[Path], read: Callable[[Path], Thing], unread: dict[Path, str] | None = None
+) -> dict[Path, Thing]:
+    """Read some files; those that cannot be are named in the log, and join the `unread` ones."""
     found = {}
     for path in paths:
         try:
             found[path] = read(path)
         except InputError as error:
             log.warning("passed over: %s", error)
+            if unread is not None:
+                unread[path] = str(error).removeprefix(f"{path}: ")
     return found

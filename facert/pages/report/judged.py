@@ -74,10 +74,23 @@ def summary_section(sections: Sequence[Section]) -> Section | None:
     return Section("Verdicts", tables=(Table("The worst first", columns, rows, words=True),))
 
 
+def worst_first(sections: Sequence[Section]) -> tuple[Section, ...]:
+    """The sections with those that hold a verdict by its level, in the places of such ones."""
+    judged = [section for section in sections if section.judged is not None]
+    ordered = iter(sorted(judged, key=_goodness))
+    return tuple(section if section.judged is None else next(ordered) for section in sections)
+
+
+def _goodness(section: Section) -> int:
+    assert section.judged is not None
+    return -LEVELS.index(section.judged.level)
+
+
 def _cures(reasons: Sequence[Reason], take: str, model: str) -> tuple[str, ...]:
-    """What to do next, once each."""
-    cures = [reason.cure_for(take, model) for reason in reasons if reason.level != LEVELS[0]]
-    return tuple(dict.fromkeys(cures)) or (GOOD,)
+    """What to do next, a line a reason; notes on a good take stay notes."""
+    good = all(reason.level == LEVELS[0] for reason in reasons)
+    cures = [f"{reason.kind}: {reason.cure_for(take, model)}" for reason in reasons]
+    return (*([GOOD] if good else []), *dict.fromkeys(cures))
 
 
 def _worst(take: Take, frames: IntArray, faces: Sequence[Face]) -> list[Picture]:

@@ -8,23 +8,24 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined, Template
 
+from facert.data.verdict import LEVELS
 from facert.pages.report.comparison_section import comparison_section
-from facert.pages.report.judged import summary_section
+from facert.pages.report.judged import summary_section, worst_first
 from facert.pages.report.sections import ReportPage, Section
 
 LIBRARIES = ("facert", "torch", "numpy", "scipy", "scikit-learn", "matplotlib")
 
 
 def make_report(title: str, sections: tuple[Section, ...]) -> ReportPage:
-    """A report with what made it; several takes are judged first, those with a truth compared."""
+    """A report with what made it; several takes are judged first, the worst before others."""
     first = [summary_section(sections), comparison_section(sections)]
-    sections = (*(section for section in first if section is not None), *sections)
+    sections = (*(section for section in first if section is not None), *worst_first(sections))
     return ReportPage(title, sections, {name: version(name) for name in LIBRARIES})
 
 
 def to_html(report: ReportPage) -> str:
     """The page; the same report gives the same text. All that came from files is escaped."""
-    return _template().render(report=report)
+    return _template().render(report=report, levels=LEVELS)
 
 
 @cache

@@ -10,6 +10,7 @@ from facert.data.shared_controls import SharedControls, require_shared, shared_c
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.data.verdict import Verdict
+from facert.demo.stand_in import is_tracked, stand_in_face
 from facert.evaluation.metrics import Comparison, compare
 from facert.pages.report.embedding import embedded
 from facert.pages.report.judged import judged
@@ -31,8 +32,8 @@ def performance_section(
 ) -> Section:
     """Pictures and facts of a take with poses; with the character's rig its faces as well.
 
-    With a `truth`, the true poses of the same frames, there are errors by part of the face. A
-    `verdict` comes first.
+    Where the source is weights of ARKit, the actor is drawn above. With a `truth`, the true poses
+    of the same frames, there are errors by part of the face. A `verdict` comes first.
 
     Raises
     ------
@@ -42,9 +43,9 @@ def performance_section(
     poses = require_poses(take)
     shared = None if truth is None else require_shared(truth, take, "Give the truth of this take.")
     pictures: list[Picture] = []
-    faces: list[Face] = []
+    faces: list[Face] = [stand_in_face(take)] if is_tracked(take) else []
     if rig is not None:
-        faces = [posed_face(take, rig, "character")]
+        faces.append(posed_face(take, rig, "character"))
         if truth is not None and shared is not None:
             faces.append(posed_face(truth if fits(rig, truth) else shared.truth, rig, "truth"))
         sheet = render_sheet(faces, choose_frames(poses, FACES), take, PIXELS)
