@@ -45,6 +45,8 @@ class CompletedPose:
         The controls that kept their value.
     corrected : Take, optional
         The retargeted frame that was corrected.
+    far : bool
+        No known pose comes near the given values: the others are a guess.
     """
 
     controls: Controls
@@ -54,6 +56,7 @@ class CompletedPose:
     samples: FloatArray
     held: tuple[str, ...] = ()
     corrected: Take | None = None
+    far: bool = False
 
     @property
     def as_dict(self) -> dict[str, Any]:
@@ -141,7 +144,7 @@ def complete_pose(
     held = _held(controls.names, hold, asked)
     rng = np.random.default_rng(seed)
     completion = Completion.learn(known, asked.controls)
-    _warn_if_far(controls, completion, asked)
+    far = _warn_if_far(controls, completion, asked)
     if start is not None:
         posed = correct(*_start(start, controls), known, asked, samples, rng, held)
     elif len(held):
@@ -151,7 +154,7 @@ def complete_pose(
     names = np.array(controls.names, dtype=np.object_)
     named = dict(zip(names[asked.controls], asked.values.tolist(), strict=True))
     kept = tuple(names[held])
-    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept, start)
+    return CompletedPose(controls, named, posed.pose, posed.std, posed.samples, kept, start, far)
 
 
 def known_poses(character: Retargeter | Take) -> tuple[Controls, KnownPoses]:
@@ -227,7 +230,7 @@ def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     return f"Did you mean {meant}?" if meant else f"There are {', '.join(names)}."
 
 
-def _warn_if_far(controls: Controls, completion: Completion, given: Given) -> None:
+def _warn_if_far(controls: Controls, completion: Completion, given: Given) -> bool:
     """Warn where known poses do not reach: there the prediction is no more than a guess."""
     known = completion.known.poses
     low, high = known.min(axis=0), known.max(axis=0)
@@ -238,8 +241,10 @@ def _warn_if_far(controls: Controls, completion: Completion, given: Given) -> No
         elif not low[index] - slack <= value <= high[index] + slack:
             text = "%s: %.3g is outside the range of the known poses (%.3g to %.3g)"
             log.warning(text, name, value, low[index], high[index])
-    if completion.farness(given.values) > FAR:
+    far = completion.farness(given.values) > FAR
+    if far:
         log.warning("no known pose comes near the given values: the others are a guess")
+    return far
 
 
 def _start(take: Take, controls: Controls) -> tuple[FloatArray, FloatArray | None]:

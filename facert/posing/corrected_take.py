@@ -30,6 +30,7 @@ def correct_take(
     width: float = WIDTH,
     hold: Sequence[str] = (),
     only: bool = False,
+    follow: bool = False,
 ) -> Take:
     """A result of retargeting with the poses of some frames corrected.
 
@@ -55,6 +56,9 @@ def correct_take(
         Controls, or patterns such as ``"mouth*"``, that keep their value unless they are set.
     only : bool
         Change no controls but those that are set.
+    follow : bool
+        Let the others follow even where no known pose comes near what is set, which is a guess.
+        Else they stay there as predicted, which is nearer to the truth on average.
 
     Returns
     -------
@@ -77,7 +81,9 @@ def correct_take(
     if len(outside):
         expected = f"0 to {len(result) - 1}"
         raise InputError("frame", expected, f"{outside[0]}", "Count frames from 0.")
-    wanted = [_pose(result, int(frame), poses[frame], character, hold, only) for frame in frames]
+    wanted = [
+        _pose(result, int(frame), poses[frame], character, hold, only, follow) for frame in frames
+    ]
     made = Corrections(frames, np.array(wanted), np.full(len(frames), width))
     return put_in(result, merged(result.corrections, made))
 
@@ -113,6 +119,7 @@ def _pose(
     character: Retargeter | Take | None,
     hold: Sequence[str],
     only: bool,
+    follow: bool,
 ) -> FloatArray:
     """The corrected pose of a frame, (P,), in the order of the result's controls."""
     assert result.controls is not None  # it was checked
@@ -131,7 +138,9 @@ def _pose(
         start = _start(result, frame)
         done = complete_pose(character, wanted, start=start, hold=hold)
         columns = match(result.controls.names, done.controls.names, "controls of the character")
-        return np.asarray(done.pose[columns], dtype=np.float64)
+        if follow or not done.far:
+            return np.asarray(done.pose[columns], dtype=np.float64)
+        log.info("frame %d: the others stay as predicted; --follow lets them follow", frame)
     given = given_controls(result.controls, wanted)
     pose = pose.copy()
     pose[given.controls] = given.values

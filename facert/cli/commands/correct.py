@@ -57,6 +57,10 @@ def command(
         option("Controls that keep their value, as 'mouth*'; again for more.", metavar="PATTERN"),
     ] = None,
     only: Annotated[bool, option("Change the controls that are set, and no others.")] = False,
+    follow: Annotated[
+        bool,
+        option("Others follow even where no known pose comes near: a guess.", "--follow"),
+    ] = False,
     remove: Annotated[
         str, option("Take the corrections of these frames back, or all.", metavar="FRAMES|all")
     ] = "",
@@ -67,11 +71,12 @@ def command(
             "Model whose poses show what the other controls then do.",
             "--model",
             "-m",
-            show_default=str(DEFAULT_MODEL),
+            show_default=f"the one that RESULT names, or {DEFAULT_MODEL}",
         ),
     ] = None,
     output: Annotated[
-        Path | None, option("Corrected result (.h5); else RESULT itself.", "--output", "-o")
+        Path | None,
+        option("Corrected result (.h5); else RESULT itself, with --overwrite.", "--output", "-o"),
     ] = None,
     overwrite: OVERWRITE = False,
 ) -> None:
@@ -103,7 +108,8 @@ def command(
                 corrected = _of_file(take, poses)
             else:
                 corrected = _of_options(take, frames, parse_controls(wanted or []))
-            made = _corrected(take, corrected, width, hold or [], only, model)
+            known = model or _named_model(take, path)
+            made = _corrected(take, corrected, width, hold or [], (only, follow), known)
     _write(take, made, path, output)
 
 
@@ -144,17 +150,33 @@ def _corrected(
     poses: Corrected,
     width: float | None,
     hold: list[str],
-    only: bool,
-    model: Path | None,
+    others: tuple[bool, bool],
+    model: Path,
 ) -> Take:
-    """The take with poses corrected; with a model where some of their controls are to follow."""
+    """The take with poses corrected; with a model where some of their controls are to follow.
+
+    `others` tells whether the others stay, and whether they follow wherever it leads.
+    """
     import facert
     from facert.data.corrections import WIDTH
 
+    only, follow = others
     whole = not any(isinstance(pose, Mapping) for pose in poses.values())
-    character = None if only or whole else facert.load(model or DEFAULT_MODEL)
+    character = None if only or whole else facert.load(model)
     width = WIDTH if width is None else width
-    return facert.correct(take, poses, character, width=width, hold=hold, only=only)
+    return facert.correct(take, poses, character, width=width, hold=hold, only=only, follow=follow)
+
+
+def _named_model(take: Take, path: Path) -> Path:
+    """The model that the result names, beside it or in the working folder; else the default."""
+    name = Path(take.model.partition(": ")[0]).name
+    if not name.endswith(DEFAULT_MODEL.suffix):
+        return DEFAULT_MODEL
+    for place in (path.parent / name, Path(name)):
+        if place.is_file():
+            console.log.info("model: %s, which %s names; --model takes another", place, path.name)
+            return place
+    return DEFAULT_MODEL
 
 
 def _of_options(take: Take, frames: str, given: Mapping[str, float]) -> Corrected:
