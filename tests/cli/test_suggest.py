@@ -95,3 +95,17 @@ def test_going_on_from_labels_needs_some(facert, make_take, tmp_path: Path) -> N
     outcome = facert("suggest", tmp_path / "take.h5", "--have", "labels")
     assert outcome.code == 3
     assert "expected posed frames" in outcome.err
+
+
+def test_who_asks_for_frames_to_pose_is_not_told_to_ask_for_them(facert, make_take, tmp_path):
+    take = make_take(frames=60, posed=60)
+    values = take.source.values.copy()
+    values[:, 3:] = values[:1, 3:]
+    still = replace(take, source=replace(take.source, values=values))
+    package.train(still, package.Settings(method="gpr-linear")).save(tmp_path / "model.safetensors")
+    package.write_take(make_take(frames=90, posed=0), tmp_path / "take.h5")
+    done = facert(
+        "suggest", tmp_path / "take.h5", "-n", 3, "--have", tmp_path / "model.safetensors"
+    )
+    assert done.code == 0
+    assert "--have MODEL" not in done.err

@@ -110,7 +110,8 @@ def command(
         footage = open_footage(video_path, given[0], video_start)
         if sheet is not None and footage is None:
             require_drawable(takes.joined, actor)
-        found = suggest_frames(takes, count, model or posed, seed)
+        with console.without_judged():  # what is unlike the posed frames is what this names
+            found = suggest_frames(takes, count, model or posed, seed)
     rows = _rows(takes, found)
     if as_json:
         files = {"file": str(paths[0])} if len(paths) == 1 else {"files": list(map(str, paths))}
