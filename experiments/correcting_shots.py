@@ -76,7 +76,8 @@ class Shot:
         confirmed = {frame: self.result.params[frame] for frame in frames}
         made = facert.correct(self.result, confirmed | dict(corrected))
         as_recorded = replace(made, source=self.truth.source)
-        return facert.train([self.taught, as_recorded]).retarget(bare)
+        model = facert.train([self.taught, as_recorded], corrections_only=True)
+        return model.retarget(bare)
 
     def errors(self, result: Take) -> FloatArray:
         """Errors of a result, (T, P)."""
@@ -120,7 +121,7 @@ def measure(shot: Shot, count: int) -> dict[str, float]:
     made = facert.correct(shot.result, truth)
     labels = {"anew, cleaned": made, "anew": with_poses(shot.truth, frames)}
     for name, labelled in labels.items():
-        model = facert.train([shot.taught, labelled])
+        model = facert.train([shot.taught, labelled], corrections_only=True)
         anew = model.retarget(replace(shot.truth, params=None))
         found[name] = rms(shot.errors(anew)[others])
     found["anew, others confirmed"] = rms(shot.errors(shot.with_confirmed(truth))[others])
