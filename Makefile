@@ -25,7 +25,7 @@ demo: $(VENV)/.installed
 	@echo "Look at $(DEMO)/faces.png and $(DEMO)/curves.png"
 
 test: $(VENV)/.installed
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: $(VENV)/.installed
 	$(BIN)/ruff format --check .

@@ -90,9 +90,8 @@ def test_a_report_begins_with_the_verdicts(facert, batch, day):
     assert done.code == 0, done.err
     page = (day / "page.html").read_text()
     assert page.index("<h2>Verdicts") < page.index("<h2>Performance")
-    assert page.index("b_bad.h5</td><td>bad</td><td>far from training") < page.index(
-        "a_good.h5</td>"
-    )
+    bad = 'b_bad.h5</td><td class="level bad">bad</td><td>far from training'
+    assert page.index(bad) < page.index("a_good.h5</td>")
     assert "--neutral FRAMES" in page
     assert "ridge.safetensors: ridge, 15 poses of tuesday.h5" in page
 

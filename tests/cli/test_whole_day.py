@@ -174,7 +174,7 @@ def pose_the_first(day: Day) -> list[int]:
     assert not (day.folder / "posed.h5").exists()
     day.write_poses("poses.csv", "first", frames, percent=slip)
     warned = day(convert)
-    assert "in percent or degrees" in warned.err
+    assert "in percent, it seems" in warned.err
     assert f"{slip} up to" in warned.err
     day.write_poses("poses.csv", "first", frames)
     done = day(f"{convert} --overwrite")

@@ -43,8 +43,9 @@ def test_sheets_are_labelled(take: Take) -> None:
 
 def test_clips_are_labelled(take: Take) -> None:
     first, second = draw_clip([face(take)], np.array([3, 33]), 160)
-    assert (first[4:24, :120] != second[4:24, :120]).any()
-    assert (first[40:] == second[40:]).all()
+    changed = np.flatnonzero((first != second).any(axis=(1, 2)))
+    assert changed.size
+    assert changed.min() > 0.8 * len(first)  # the number stands below the face
 
 
 def test_a_contact_sheet_says_what_is_drawn(take: Take) -> None:
