@@ -145,5 +145,5 @@ def _of_system(error: OSError) -> str:
 
 def _drop_output() -> None:
     """Discard output that could not be written: Python would try again at its end."""
-    with suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123
+    with suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123  a device, not a path
         os.dup2(nowhere.fileno(), sys.stdout.fileno())

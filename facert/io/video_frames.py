@@ -35,7 +35,7 @@ PIXELS = 480
 MAX_HOURS = 12
 _MAX_PIXELS = 2**27  # of a frame of the file
 _FORMATS = "mov,matroska,avi,mpegts,mpeg,mxf,gif"  # none that names other files
-_FASTEST = 60.0  # frames a second that are told apart
+_FASTEST = 60.0  # frames a second that are distinguished
 _AT_ONCE, _KEPT = 16, 8  # frames that are decoded together, and how many such lots are kept
 _SECONDS = 60  # that ffmpeg may take for one of them
 _DAY = 24 * 3600
@@ -83,7 +83,7 @@ class VideoFrames:
             raise InputError("--video", expected, f"{self.duration:.0f} s", fix, str(path))
         rates = [float(rate) * (1000 if k else 1) for rate, k in _RATE.findall(stream[0])]
         self.fps = min(max(rates, default=30.0), _FASTEST) or 30.0
-        """Frames a second that are told apart."""
+        """Frames a second that are distinguished."""
         code = _TIMECODE.search(about)
         self.start_timecode = code[1] if code else ""
         """As ``HH:MM:SS:FF``; empty where the file has none."""

@@ -32,7 +32,7 @@ STILL = 0.3
 NEW = 0.6
 """A frame is new when its residual is so much of the usual motion, RMS over markers."""
 TELLING = 5
-"""Fewer poses tell nothing of what matters: all does."""
+"""With fewer poses every weight counts in full."""
 SHOWN = 0.5
 """A weight was shown in posed frames that vary by this share of its usual variance there."""
 LEAST_SHARE = 0.05
@@ -86,9 +86,10 @@ def relevance(
     """How far what each weight does matters to the poses, (n,), from 0 to 1.
 
     A gaze, or the angles of a head, may move a lot while no control of the character goes with it:
-    what it does in other frames is of no account. So a weight matters as far as the poses tell it,
-    by ridge regression from these with the row itself left out. One that posed frames hardly move
-    may be an expression that was not shown yet: it matters. Twins, of left and right, go together.
+    what it does in other frames is of no account. So a weight matters as far as the poses explain
+    it, by ridge regression from these with the row itself left out. One that posed frames hardly
+    move may be an expression that was not shown yet: it matters. Twins, of left and right, go
+    together.
 
     Parameters
     ----------
@@ -109,9 +110,9 @@ def relevance(
     whole = posed.var(axis=0) * (count / (count - 1)) ** 2  # likewise of the others' mean
     twins = counterparts(names)
     missed, whole, usual = (values + values[twins] for values in (missed, whole, variance))
-    told = 1.0 - np.divide(missed, whole, out=np.ones_like(whole), where=whole > 0.0)
+    explained = 1.0 - np.divide(missed, whole, out=np.ones_like(whole), where=whole > 0.0)
     moved = np.divide(whole, SHOWN * usual, out=np.zeros_like(whole), where=usual > 0.0)
-    return np.asarray(1.0 - np.minimum(moved, 1.0) * (1.0 - np.clip(told, 0.0, 1.0)))
+    return np.asarray(1.0 - np.minimum(moved, 1.0) * (1.0 - np.clip(explained, 0.0, 1.0)))
 
 
 def over_names(amounts: FloatArray) -> FloatArray:

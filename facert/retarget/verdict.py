@@ -33,7 +33,7 @@ def judge(
     Parameters
     ----------
     take : Take or None
-        As it was recorded, with its gaps; without it, nothing is said of these.
+        As it was recorded, with its gaps; without it, gaps are not judged.
     result : Take
         With the cleaned source and the poses.
     model : TrainedModel

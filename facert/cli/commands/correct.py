@@ -155,7 +155,7 @@ def _corrected(
 ) -> Take:
     """The take with poses corrected; with a model where some of their controls are to follow.
 
-    `others` tells whether the others stay, and whether they follow wherever it leads.
+    `others` states whether the others stay, and whether they follow wherever it leads.
     """
     import facert
     from facert.data.corrections import WIDTH

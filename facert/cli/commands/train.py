@@ -50,7 +50,7 @@ def with_settings(function: Callable[..., None]) -> Callable[..., None]:
     signature = inspect.signature(function, eval_str=True)
     own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
     made = [_option(name) for name, (_, about) in DESCRIBED.items() if about.group != FINE]
-    function.__signature__ = signature.replace(parameters=[*own, *made])  # type: ignore[attr-defined]
+    function.__signature__ = signature.replace(parameters=[*own, *made])  # type: ignore[attr-defined]  # Typer reads it
     return function
 
 
@@ -64,7 +64,7 @@ def _option(name: str) -> inspect.Parameter:
     made = option(
         about.help + methods, show_default=default_text(name), metavar=words, panel=about.group
     )
-    annotation = Annotated[plain | None, made]  # type: ignore[valid-type]
+    annotation = Annotated[plain | None, made]  # type: ignore[valid-type]  # made of a value
     keyword = inspect.Parameter.KEYWORD_ONLY
     return inspect.Parameter(name, keyword, default=None, annotation=annotation)
 

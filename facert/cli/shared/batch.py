@@ -20,7 +20,7 @@ from facert.io.registry import Kind, output_format, require_replaceable
 
 Thing = TypeVar("Thing")
 Work = Callable[[Path, Path], Thing]
-"""Makes one file from another, and returns what is to be said of it in the end; must be picklable
+"""Makes one file from another, and returns its note for the end; must be picklable
 where there are several jobs."""
 
 

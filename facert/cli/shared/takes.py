@@ -60,7 +60,7 @@ def read_takes(
 
 
 def short_names(paths: Sequence[Path]) -> list[str]:
-    """Names of files in messages: without their folders, where that tells them apart."""
+    """Names of files in messages: without their folders, where that distinguishes them."""
     names = [path.name for path in paths]
     return names if len(set(names)) == len(names) else [str(path) for path in paths]
 

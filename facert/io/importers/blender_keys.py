@@ -17,7 +17,7 @@ _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_
 
 
 def key_controls(face: Face, points: Mapping[str, Points], anew: bool) -> list[str]:
-    """Key the controls that a face has; return what is to be said of the others.
+    """Key the controls that a face has; return notes on the others.
 
     Keys that are there give way to the new ones at the same frames, and `anew` all of them.
 

@@ -100,10 +100,10 @@ def export_poses(
         raise ScriptError(f"all frames are before the recording's first, which is at {start:g}")
     poses = _without_strangers(scene, poses)
     write_poses(path, poses, timeline_of(scene).rate)
-    said = [f"not in the recording, left out: {some(outside)}"] if outside else []
+    notes = [f"not in the recording, left out: {some(outside)}"] if outside else []
     shown = some([str(pose.frame) for pose in poses])
     what = f"{plural(len(poses), 'pose')} of {plural(len(poses[0].values), 'control')}"
-    return Report(f"{what}, of frames {shown}", [*face.warnings, *said])
+    return Report(f"{what}, of frames {shown}", [*face.warnings, *notes])
 
 
 def mark_frames(scene: Any, path: str, text: str, take: str, start: float) -> Report:
@@ -120,8 +120,8 @@ def mark_frames(scene: Any, path: str, text: str, take: str, start: float) -> Re
         _mark(scene, frame, start + when * rate)
     last = max(marker.frame for marker in scene.timeline_markers)
     scene.frame_end = max(scene.frame_end, last)
-    said = [] if known or TIMELINE in scene else [f"by the scene's {rate:g} frames/s"]
-    return Report(plural(len(found), "marker"), said)
+    notes = [] if known or TIMELINE in scene else [f"by the scene's {rate:g} frames/s"]
+    return Report(plural(len(found), "marker"), notes)
 
 
 def key_poses(
@@ -135,8 +135,8 @@ def key_poses(
         when = line.seconds(number or 0) if seconds is None else seconds
         frame = round(start + when * rate, 3)
         scene.frame_set(math.floor(frame), subframe=frame % 1)
-        said = key_controls(face, {c: [(frame, v)] for c, v in values.items()}, anew=False)
-        warnings += [text for text in said if text not in warnings]
+        notes = key_controls(face, {c: [(frame, v)] for c, v in values.items()}, anew=False)
+        warnings += [text for text in notes if text not in warnings]
         _mark(scene, line.frame(when) if number is None else number, frame)
     scene.frame_set(now)
     return Report(f"{plural(len(found), 'pose')} keyed", [*face.warnings, *warnings])

@@ -4,7 +4,7 @@ In CSV the first cell is anybody's; facert's name there is its mark. Every cell 
 Unreal takes a blank for 0. In JSON, a list with an object a curve, a gap is a key that is not
 there, and the blank before the first colon is facert's mark.
 
-Unreal drops blanks, commas and quotes from the names, tells no capitals from small letters, holds
+Unreal drops blanks, commas and quotes from the names, takes capitals for small letters, holds
 times in single precision, and refuses a row whose name or time it has already.
 """
 
