@@ -102,19 +102,7 @@ def of_character(take: Take, controls: Controls) -> Take:
         return take if take.controls is None else replace(take, controls=controls)
     places = _places(take.controls.names, controls, "/target/names")
     spread = partial(_spread, places=places, count=len(controls.names))
-    params, std, animation = (
-        None if values is None else spread(values)
-        for values in (take.params, take.std, take.animation)
-    )
-    corrections = None if take.corrections is None else take.corrections.mapped(spread)
-    return replace(
-        take,
-        controls=controls,
-        params=params,
-        std=std,
-        animation=animation,
-        corrections=corrections,
-    )
+    return take.with_controls(controls, spread)
 
 
 def _places(names: Sequence[str], controls: Controls, field: str) -> list[list[int]]:

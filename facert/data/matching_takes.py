@@ -272,19 +272,7 @@ def _with_controls(part: Take, name: str, controls: Controls) -> Take:
             extra = next(name for place, name in enumerate(own) if place not in columns)
             expected, found = f"{len(columns)} controls as in the first take", f"{extra!r} as well"
             raise InputError("/target/names", expected, found, "Pose the same controls.")
-    params, std, animation = (
-        None if rows is None else rows[:, columns]
-        for rows in (part.params, part.std, part.animation)
-    )
-    corrections = None if part.corrections is None else part.corrections.of_controls(columns)
-    return replace(
-        part,
-        controls=controls,
-        params=params,
-        std=std,
-        animation=animation,
-        corrections=corrections,
-    )
+    return part.with_controls(controls, lambda rows: rows[:, columns])
 
 
 def _animation(one: Named, controls: Controls) -> FloatArray:

@@ -308,6 +308,22 @@ class Take:
         """The take with these poses, (T, P), that somebody set, in place of those that it has."""
         return replace(self, controls=controls, params=params, std=None, corrections=None, model="")
 
+    def with_controls(self, controls: Controls, rows: Callable[[FloatArray], FloatArray]) -> Take:
+        """The take with all its poses, (n, P), brought to other controls by a function of them."""
+        corrections = None if self.corrections is None else self.corrections.mapped(rows)
+        params, std, animation = (
+            None if poses is None else rows(poses)
+            for poses in (self.params, self.std, self.animation)
+        )
+        return replace(
+            self,
+            controls=controls,
+            params=params,
+            std=std,
+            animation=animation,
+            corrections=corrections,
+        )
+
     @property
     def labels(self) -> IntArray:
         """Indices of the frames whose pose is known."""

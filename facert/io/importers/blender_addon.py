@@ -52,6 +52,7 @@ def _glob(endings: str) -> Any:
     return bpy.props.StringProperty(default=endings, options={"HIDDEN"})
 
 
+# What bpy gives has no types, and Blender reads plain lists and sets of these classes.
 class FacertSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
     """What all steps share; it is kept with the scene."""
 
