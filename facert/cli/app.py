@@ -37,20 +37,21 @@ from facert.cli.commands import (
 from facert.cli.shared import console
 from facert.cli.shared.help import Command, Group
 from facert.cli.shared.options import option
+from facert.data import memory
 from facert.data.version import CREATED_BY
 from facert.errors import FacertError
 
-ABOUT_MESSAGES = ("-q", "--quiet", "-v", "--verbose")
+ANYWHERE = ("-q", "--quiet", "-v", "--verbose", memory.OPTION)
+"""Options of the whole command that may stand after its name as well as before it."""
 
 
 class _Commands(Group):
     """Group of commands that ends at Ctrl-C in silence, with the exit status shells expect."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Let the options about messages stand after the command as well as before it."""
+        """Let the options of the whole command stand after its name as well as before it."""
         own = args[: args.index("--")] if "--" in args else args
-        moved = [arg for arg in own if arg in ABOUT_MESSAGES]
-        rest = [arg for arg in own if arg not in ABOUT_MESSAGES]
+        moved, rest = _split(own)
         return super().parse_args(ctx, [*moved, *rest, *args[len(own) :]])
 
     def invoke(self, ctx: Any) -> Any:
@@ -60,6 +61,16 @@ class _Commands(Group):
         except KeyboardInterrupt:
             console.err.print("stopped", style="yellow")
             raise typer.Exit(130) from None
+
+
+def _split(args: list[str]) -> tuple[list[str], list[str]]:
+    """The options that may stand anywhere, with their values, and all else."""
+    moved: list[str] = []
+    rest: list[str] = []
+    for arg in args:
+        value = bool(moved) and moved[-1] == memory.OPTION
+        (moved if value or arg.partition("=")[0] in ANYWHERE else rest).append(arg)
+    return moved, rest
 
 
 app = typer.Typer(
@@ -82,12 +93,22 @@ def _print_version(asked: bool) -> None:
 def options(
     quiet: Annotated[bool, option("Results, warnings and errors only.", "--quiet", "-q")] = False,
     verbose: Annotated[bool, option("Details as well.", "--verbose", "-v")] = False,
+    max_memory: Annotated[
+        str | None,
+        option(
+            "What a file or a computation may take at most.",
+            memory.OPTION,
+            metavar="SIZE",
+            show_default="100 times the file, at least 64M, at most 2G",
+        ),
+    ] = None,
     _version: Annotated[
         bool, option("Print the version.", "--version", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
     """Handle the options that may stand before or after the command."""
     console.configure(quiet, verbose)
+    memory.set_max_memory(max_memory)
 
 
 PANELS: dict[str, dict[str, ModuleType]] = {

@@ -11,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from threading import Thread
 from typing import Any, TypeVar
 
+from facert.data.memory import share_memory
 from facert.errors import FacertError
 
 Result = TypeVar("Result")
@@ -58,7 +59,7 @@ def call_each(
         return_as="generator_unordered",
         max_nbytes=None,  # arrays as they are: a mapped one cannot be written to
         initializer=_begin_process,
-        initargs=(begin,),
+        initargs=(begin, jobs),
     )
     try:
         yield from pool(delayed(function)(*each) for each in arguments)
@@ -66,8 +67,9 @@ def call_each(
         raise FacertError("a process was killed; if for lack of memory, use fewer --jobs") from None
 
 
-def _begin_process(begin: Callable[[], object] | None) -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
+def _begin_process(begin: Callable[[], object] | None, processes: int) -> None:
+    """Leave Ctrl-C to the parent, and end with it; take a share of the memory."""
+    share_memory(processes)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
     if begin is not None:

@@ -12,6 +12,7 @@ import pytest
 from facert.cli import app
 from facert.cli.commands import inspect
 from facert.cli.shared import console
+from facert.data import memory
 from facert.io.formats import write_take_file
 
 
@@ -60,3 +61,18 @@ def test_foreign_names_in_the_log_move_no_cursor():
     with console.err.capture() as shown:
         console.log.warning("no shape for %s", "\x1b[31mjaw\x9b2J")
     assert shown.get() == "warning: no shape for \\x1b[31mjaw\\x9b2J\n"
+
+
+@pytest.mark.parametrize("given", [("--max-memory", "3G"), ("--max-memory=3G",)])
+@pytest.mark.parametrize("first", [True, False])
+def test_the_limit_of_memory_may_stand_anywhere(facert, monkeypatch, given, first):
+    monkeypatch.setenv(memory.VARIABLE, "1G")
+    asked = ("inspect", "no.h5")
+    facert(*((*given, *asked) if first else (*asked, *given)))
+    assert memory.max_memory() == 3 << 30
+
+
+def test_a_limit_of_memory_that_is_none_is_told(facert):
+    refused = facert("inspect", "no.h5", "--max-memory", "much")
+    assert refused.code == 3
+    assert refused.err.startswith("error: --max-memory: expected a size such as 500M or 4G")
