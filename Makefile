@@ -7,8 +7,10 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 DEMO ?= build/demo
+# How long `make fuzz` takes, over all targets.
+MINUTES ?= 10
 
-.PHONY: demo test check format docs bench figures acceptance mutants clean
+.PHONY: demo test check format docs bench figures acceptance mutants fuzz clean
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -48,6 +50,11 @@ bench: $(VENV)/.installed
 # Small changes of the mathematics: a test must notice each.
 mutants: $(VENV)/.installed
 	$(BIN)/python -m experiments.mutants
+
+# All readers under atheris; findings go to tests/fuzz/findings, where the tests take them up.
+fuzz: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[fuzz]'
+	$(BIN)/python -m experiments.fuzz --minutes $(MINUTES)
 
 # Both need the real recordings (FACERT_DATA), take their time, and continue where they stopped.
 figures: $(VENV)/.installed

@@ -11,6 +11,8 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from facert.data.clock import put_together
 from facert.data.names import canonical
 from facert.data.rate import nominal_rate
@@ -42,6 +44,8 @@ def read_facecap(path: Path) -> Take:
         check_width(rows, header)
         columns = [_CLOCK, *range(_SHAPES, len(header))]
         values = to_numbers(rows, header, columns)
+        for row in np.flatnonzero(~np.isfinite(values[:, 0])):
+            raise rows[row].error("milliseconds", "a number", repr(rows[row].cells[_CLOCK][:40]))
         time = put_together((values[:, 0] - values[0, 0]) / 1000.0, values[:, 1:])
         log.info("the motion of head and eyes is left out")
         return Take(

@@ -45,6 +45,8 @@ def test_a_comma_at_the_end_of_lines_is_no_column(path: Path) -> None:
         (HEAD, "expected lines of frames"),
         (f"{HEAD}k,0,{POSE},1,2\n", "line 3: expected 15 cells"),
         (f"{HEAD}k,0,{POSE},1,2,x\n", "line 3, column mouthSmile_R"),
+        (f"{HEAD}k,1e999,{POSE},1,2,3\n", "line 3, column milliseconds: .* found '1e999'"),
+        (f"{HEAD}k,,{POSE},1,2,3\n", "line 3, column milliseconds: .* found ''"),
         (f"{HEAD}k,5,{POSE},1,2,3\nk,5,{POSE},1,2,3\n", "/time"),
         (f"{HEAD}{HEAD}k,5,{POSE},1,2,3\n", "lines bs: expected one line"),
         (HEAD.replace("eyeBlink_L", "browInnerUp") + f"k,0,{POSE},1,2,3\n", "twice"),
