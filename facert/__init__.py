@@ -14,11 +14,13 @@ The public names are loaded when they are first used: torch takes its time.
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
 
 from facert.data.version import VERSION
 
+TYPE_CHECKING = False  # as in typing, which takes its time: see facert.cli.shared.signals
 if TYPE_CHECKING:
+    from typing import Any
+
     from facert.data.rig import Rig
     from facert.data.take import Controls, Corrections, Source, Take
     from facert.data.verdict import Verdict

@@ -1,170 +1,37 @@
-"""The ``facert`` command: one registry of commands, one place where errors become exit codes."""
+"""The door of the ``facert`` command: signals are handled before anything else is loaded."""
 
 from __future__ import annotations
 
-import os
 import sys
-from contextlib import suppress
-from types import ModuleType
-from typing import Annotated, Any
 
-import typer
+from facert.cli.shared.signals import signals
 
-from facert.cli.commands import (
-    clean,
-    convert,
-    correct,
-    demo,
-    drive,
-    evaluate,
-    export_script,
-    inspect,
-    live,
-    plot,
-    points,
-    pose,
-    propagate,
-    regions,
-    render,
-    report,
-    retarget,
-    simulate,
-    stabilise,
-    suggest,
-    train,
-    view,
-)
-from facert.cli.shared import console
-from facert.cli.shared.help import Command, Group
-from facert.cli.shared.options import option
-from facert.data import memory
-from facert.data.version import CREATED_BY
-from facert.errors import FacertError
-
-ANYWHERE = ("-q", "--quiet", "-v", "--verbose", memory.OPTION)
-"""Options of the whole command that may stand after its name as well as before it."""
-
-
-class _Commands(Group):
-    """Group of commands that ends at Ctrl-C in silence, with the exit status shells expect."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Let the options of the whole command stand after its name as well as before it."""
-        own = args[: args.index("--")] if "--" in args else args
-        moved, rest = _split(own)
-        return super().parse_args(ctx, [*moved, *rest, *args[len(own) :]])
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run the command that was asked for."""
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            console.err.print("stopped", style="yellow")
-            raise typer.Exit(130) from None
-
-
-def _split(args: list[str]) -> tuple[list[str], list[str]]:
-    """The options that may stand anywhere, with their values, and all else."""
-    moved: list[str] = []
-    rest: list[str] = []
-    for arg in args:
-        value = bool(moved) and moved[-1] == memory.OPTION
-        (moved if value or arg.partition("=")[0] in ANYWHERE else rest).append(arg)
-    return moved, rest
-
-
-app = typer.Typer(
-    name="facert",
-    cls=_Commands,
-    help="Carry a facial performance over to any character's rig, from a handful of poses.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-def _print_version(asked: bool) -> None:
-    if asked:
-        console.out.print(CREATED_BY)
-        raise typer.Exit
-
-
-@app.callback()
-def options(
-    quiet: Annotated[bool, option("Results, warnings and errors only.", "--quiet", "-q")] = False,
-    verbose: Annotated[bool, option("Details as well.", "--verbose", "-v")] = False,
-    max_memory: Annotated[
-        str | None,
-        option(
-            "What a file or a computation may take at most.",
-            memory.OPTION,
-            metavar="SIZE",
-            show_default="100 times the file, at least 64M, at most 2G",
-        ),
-    ] = None,
-    _version: Annotated[
-        bool, option("Print the version.", "--version", callback=_print_version, is_eager=True)
-    ] = False,
-) -> None:
-    """Handle the options that may stand before or after the command."""
-    console.configure(quiet, verbose)
-    memory.set_max_memory(max_memory)
-
-
-PANELS: dict[str, dict[str, ModuleType]] = {
-    "Pose and suggest": {"suggest": suggest, "pose": pose},
-    "Train and retarget": {
-        "train": train,
-        "regions": regions,
-        "retarget": retarget,
-        "correct": correct,
-    },
-    "Look and judge": {
-        "inspect": inspect,
-        "view": view,
-        "render": render,
-        "plot": plot,
-        "eval": evaluate,
-        "report": report,
-    },
-    "Prepare takes": {
-        "demo": demo,
-        "convert": convert,
-        "stabilise": stabilise,
-        "clean": clean,
-        "simulate": simulate,
-    },
-    "Without training": {"propagate": propagate, "drive": drive, "points": points},
-    "Live and in other programs": {"live": live, "export-script": export_script},
-}
-for panel, modules in PANELS.items():
-    for name, module in modules.items():
-        if module is points:
-            app.add_typer(points.app, name=name, rich_help_panel=panel)
-        else:
-            app.command(name, cls=Command, rich_help_panel=panel)(module.command)
+TYPE_CHECKING = False  # as in typing, which takes its time
+if TYPE_CHECKING:
+    import typer
 
 
 def main() -> None:
-    """Run the command line: exit 0 done, 1 failed, 2 wrong usage, 3 bad input, 130 stopped."""
+    """Run the command line.
+
+    Exits with 0 done, 1 failed, 2 wrong usage, 3 bad input, 128 + n ended by signal n.
+    """
+    is_program = sys._getframe(1).f_globals.get("__name__") == "__main__"
+    if is_program:  # elsewhere signals are those of the program that calls
+        signals.install()
+    from facert.cli.program import run
+
     try:
-        app()
-    except FacertError as error:
-        console.err.print(f"error: {error}", style="red", markup=False)
-        sys.exit(error.exit_code)
-    except OSError as error:
-        console.err.print(f"error: {_of_system(error)}", style="red", markup=False)
-        _drop_output()
-        sys.exit(1)
+        run()
+    finally:
+        if is_program:
+            signals.ignore()
 
 
-def _of_system(error: OSError) -> str:
-    """The operating system's error message, with the file if it is about one."""
-    where = f"{error.filename}: " if error.filename else "input or output: "
-    return where + (error.strerror or str(error))
+def __getattr__(name: str) -> typer.Typer:
+    """The Typer application, loaded when it is asked for."""
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from facert.cli.program import app
 
-
-def _drop_output() -> None:
-    """Discard output that could not be written: Python would try again at its end."""
-    with suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123  a device, not a path
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    return app

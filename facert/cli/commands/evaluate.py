@@ -191,9 +191,9 @@ def _run(
     try:
         outcomes = run(problem, grid, settings, jobs or cores(), journal)
         done = list(watched(outcomes, len(grid.cells), "cells"))
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         if journal is not None:
-            console.log.warning("the same command continues from %s", journal.path)
+            stop.add_note(f"the same command continues from {journal.path}")
         raise
     unexpected = sum(bool(outcome.details) for outcome in done)
     if unexpected:

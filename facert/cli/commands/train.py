@@ -21,6 +21,7 @@ from facert.cli.shared.options import (
     file_option,
     option,
 )
+from facert.cli.shared.signals import signals
 from facert.cli.shared.takes import listed_files, read_takes
 from facert.errors import InputError, reading
 from facert.io.registry import require_replaceable
@@ -166,7 +167,7 @@ def command(
     _print_table(retargeter, output)
     if status == "interrupted":
         console.log.warning("stopped; --resume continues")
-        raise typer.Exit(130)
+        raise typer.Exit(signals.status)
 
 
 def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, Any]) -> Settings:

@@ -11,9 +11,19 @@ from rich.console import Console
 from facert.data.subject import subject
 from facert.errors import escaped
 
+
+class _Console(Console):
+    """Console that leaves what to do when nobody reads its output to the command line."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise the `BrokenPipeError` that is being handled."""
+        self.quiet = True
+        raise
+
+
 # Rich honours NO_COLOR and drops styles when the stream is not a terminal.
-out = Console(soft_wrap=True, highlight=False)
-err = Console(stderr=True, soft_wrap=True, highlight=False)
+out = _Console(soft_wrap=True, highlight=False)
+err = _Console(stderr=True, soft_wrap=True, highlight=False)
 
 log = logging.getLogger("facert")
 

@@ -1,34 +1,21 @@
-"""Interruption of commands that run until they are asked to end."""
+"""Commands that run until they are asked to end."""
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event
-from types import FrameType
-from typing import Any
 
 from facert.cli.shared import console
+from facert.cli.shared.signals import signals
 
 
 @contextmanager
 def interruptible() -> Iterator[Event]:
-    """An event that Ctrl-C, or a request to end, sets; a second Ctrl-C stops at once."""
+    """An event that Ctrl-C, or a request to end, sets; a second one stops at once."""
     asked = Event()
-    before: dict[int, Any] = {}
-
-    def stop(number: int, _frame: FrameType | None) -> None:
-        asked.set()
-        signal.signal(number, before[number] or signal.SIG_DFL)
-
-    for one in (signal.SIGINT, signal.SIGTERM):
-        before[one] = signal.signal(one, stop)
-    try:
+    with signals.setting(asked):
         yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def wait_for_end(page: str) -> None:
