@@ -1,4 +1,4 @@
-"""A page's server: on this machine only unless asked for more, and quiet."""
+"""A page's server: on this machine only unless asked for more, guarded, and quiet."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
-from facert.errors import FacertError, InputError
+from facert.errors import FacertError, InputError, escaped
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
+    from facert.pages.guard import Guard
+
 LOOPBACK = "127.0.0.1"
 BRAND = (31, 111, 139)
 _HIGHEST_PORT = 65535
+_TOKENS: WeakKeyDictionary[ViserServer, str] = WeakKeyDictionary()
 
 
 def require_viser() -> None:
@@ -41,12 +45,14 @@ def page_server(title: str, host: str = LOOPBACK, port: int = 8080) -> Iterator[
     ------
     InputError
         For a host that is not one of this machine's addresses.
+    FacertError
+        For a version of viser that cannot be guarded.
     """
-    import viser
+    from facert.pages.guard import Guard
 
-    _require_address(host, port)
+    guard = Guard(host, _require_address(host, port))
     with redirect_stdout(StringIO()):  # viser introduces itself there
-        server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        server = _guarded_server(guard, title, host, port)
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=BRAND)
     try:
         yield server
@@ -55,11 +61,32 @@ def page_server(title: str, host: str = LOOPBACK, port: int = 8080) -> Iterator[
             server.stop()
 
 
+def _guarded_server(guard: Guard, title: str, host: str, port: int) -> ViserServer:
+    """A server that asks the guard; FacertError for a viser that cannot be made to."""
+    import viser
+
+    from facert.pages.guard import guarding
+    from facert.pages.messages import accepting
+
+    with guarding(guard) as is_used:
+        server = viser.ViserServer(host=host, port=port, label=escaped(title), verbose=False)
+    try:
+        if not is_used():
+            raise AttributeError
+        guard.accepts = accepting(server)
+    except AttributeError:
+        server.stop()
+        text = "this version of viser cannot be kept from answering other web sites"
+        raise FacertError(f"{text} ({viser.__version__}): pip install viser==1.1.1") from None
+    _TOKENS[server] = guard.token
+    return server
+
+
 def address(server: ViserServer) -> str:
-    """The address to open in a browser."""
-    host = server.get_host()
+    """The address to open in a browser, with its token where it has one."""
+    host, token = server.get_host(), _TOKENS.get(server, "")
     shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{server.get_port()}"
+    return f"http://{shown}:{server.get_port()}" + (f"/?token={token}" if token else "")
 
 
 def show_errors(server: ViserServer) -> Callable[[str], None]:
@@ -67,13 +94,13 @@ def show_errors(server: ViserServer) -> Callable[[str], None]:
 
     def show(text: str) -> None:
         for client in server.get_clients().values():
-            client.add_notification("This did not work", text, color="red")
+            client.add_notification("This did not work", escaped(text), color="red")
 
     return show
 
 
-def _require_address(host: str, port: int) -> None:
-    """Check host and port: the server would try wrong ones again and again."""
+def _require_address(host: str, port: int) -> str:
+    """Check host and port, as the server would try wrong ones again and again; return numbers."""
     if not 0 <= port <= _HIGHEST_PORT:
         raise InputError("--port", f"0 to {_HIGHEST_PORT}", f"{port}", "Choose another.")
     try:
@@ -82,6 +109,7 @@ def _require_address(host: str, port: int) -> None:
         )[0]
         with socket.socket(family, kind, protocol) as trial:
             trial.bind(where)
+            return str(where[0])
     except OSError as error:
         expected, found = "an address of this machine", f"{host!r} ({error.strerror})"
         raise InputError("--host", expected, found, f"Give {LOOPBACK}, say.") from None

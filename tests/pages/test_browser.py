@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed")
 
+
 import facert
 from facert.data.rig import Rig
 from facert.data.take import Take
