@@ -43,6 +43,7 @@ from facert.cli.shared.options import option
 from facert.cli.shared.signals import signals
 from facert.data import memory
 from facert.data.version import CREATED_BY
+from facert.io.claims import claims_kept
 
 UNREAD = 128 + 13  # what shells show of a program that SIGPIPE ended: nobody reads its output
 ANYWHERE = ("-q", "--quiet", "-v", "--verbose", memory.OPTION)
@@ -61,7 +62,7 @@ class _Commands(Group):
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for, until it is done or a signal ends it."""
         try:
-            with signals.raising():
+            with signals.raising(), claims_kept():
                 result = super().invoke(ctx)
         except KeyboardInterrupt as stop:
             notes = getattr(stop, "__notes__", [])

@@ -28,7 +28,7 @@ from facert.data.rate import standard_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import write_text
 from facert.io.guarded import read_beginning, read_text
 
 _NAMES = ("facsNames", "names", "blendShapeNames")
@@ -95,8 +95,7 @@ def write_curves(take: Take, path: Path, overwrite: bool = False) -> None:
         "time": take.time.tolist(),
         "weightMat": rows,
     }
-    with replacing(path, overwrite) as temporary:
-        temporary.write_text(json.dumps(document, allow_nan=False), encoding="utf-8")
+    write_text(json.dumps(document, allow_nan=False), path, overwrite)
 
 
 def bears_mark(path: Path) -> bool:

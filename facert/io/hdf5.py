@@ -22,8 +22,9 @@ from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.rig import Mesh
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import writing
 from facert.io.guarded import existing_file
+from facert.io.hdf5_output import HDF5Output
 
 TAKE_FORMAT, RIG_FORMAT = "facert-take", "facert-rig"
 MAX_VALUES = 2**27
@@ -245,14 +246,15 @@ def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
 class NewFile:
     """Writing access to a new HDF5 file; the same data give the same bytes."""
 
-    def __init__(self, file: h5py.File) -> None:
-        self._file = file
+    def __init__(self, file: h5py.File, output: HDF5Output) -> None:
+        self._file, self._output = file, output
 
     def array(self, path: str, values: NDArray[Any] | None) -> None:
         """Write an array, compressed unless there is nothing in it; None is left out."""
         if values is not None:
             packing = {"compression": "gzip", "shuffle": True} if values.size else {}
             self._file.create_dataset(path, data=values, **packing)
+            self._output.require_written()
 
     def mesh(self, mesh: Mesh) -> None:
         """Write the mesh at rest of a rig or a mesh sequence."""
@@ -268,7 +270,7 @@ class NewFile:
         lzf and takes three times as long.
         """
         packing = {"chunks": (1, *shape[1:]), "compression": "lzf", "shuffle": True}
-        return NewRows(self._file.create_dataset(path, shape, np.float32, **packing))
+        return NewRows(self._file.create_dataset(path, shape, np.float32, **packing), self._output)
 
     def names(self, path: str, names: Sequence[str]) -> None:
         """Write a list of names as UTF-8 strings."""
@@ -283,8 +285,8 @@ class NewFile:
 class NewRows:
     """A new dataset that is filled from the first row to the last, a batch at a time."""
 
-    def __init__(self, dataset: h5py.Dataset) -> None:
-        self._dataset = dataset
+    def __init__(self, dataset: h5py.Dataset, output: HDF5Output) -> None:
+        self._dataset, self._output = dataset, output
         self.shape: tuple[int, ...] = dataset.shape
         self.filled = 0
 
@@ -294,6 +296,7 @@ class NewRows:
         if values.shape[1:] != self.shape[1:] or end > self.shape[0]:
             raise ValueError(f"rows {self.filled} to {end} of {values.shape} into {self.shape}")
         self._dataset[self.filled : end] = values.astype(np.float32)  # HDF5 would be slower at it
+        self._output.require_written()
         self.filled = end
 
 
@@ -303,12 +306,17 @@ def create(path: Path, format_name: str, version: int, overwrite: bool) -> Itera
 
     Raises `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
-    with replacing(path, overwrite) as temporary, h5py.File(temporary, "w") as file:
-        new = NewFile(file)
-        new.attribute("format", format_name)
-        new.attribute("format_version", version)
-        new.attribute("created_by", CREATED_BY)
-        yield new
+    with writing(path, overwrite) as raw:
+        output = HDF5Output(raw)
+        try:
+            with h5py.File(output, "w") as file:
+                new = NewFile(file, output)
+                new.attribute("format", format_name)
+                new.attribute("format_version", version)
+                new.attribute("created_by", CREATED_BY)
+                yield new
+        finally:
+            output.require_written()
 
 
 def _check_storage(dataset: h5py.Dataset, path: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from facert.errors import reading
-from facert.io.atomic import replacing
+from facert.io.atomic import Appended, write_text
 from facert.io.guarded import read_text
 
 log = logging.getLogger(__name__)
@@ -35,14 +35,16 @@ class Journal:
         entries = self._entries()
         header = {"fingerprint": self._fingerprint}
         text = "".join(json.dumps(line) + "\n" for line in (header, *entries))
-        with replacing(self.path, overwrite=True) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_text(text, self.path, overwrite=True)
         return entries
 
     def add(self, entry: Mapping[str, Any]) -> None:
-        """Append one entry to the file."""
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry, allow_nan=False) + "\n")
+        """Append one entry to the file, which then outlives a kill, and a power cut.
+
+        Raises `InputError` when it cannot be written; the entries before stay as they are.
+        """
+        with Appended(self.path) as file:
+            file.add(json.dumps(entry, allow_nan=False).encode() + b"\n", sync=True)
 
     def remove(self) -> None:
         """Delete the file: the work is complete."""

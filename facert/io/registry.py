@@ -6,6 +6,8 @@ first path of its kind. Whatever lists endings (messages, help, the table in the
 
 from __future__ import annotations
 
+import errno
+import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -14,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from facert.errors import InputError, OutputExistsError, OutputKeptError
+from facert.io.claims import claim
 from facert.io.content import endings_by_content
 from facert.io.guarded import parsing
 
@@ -258,16 +261,40 @@ def is_foreign(path: Path) -> bool:
 
 
 def require_replaceable(path: Path, overwrite: bool) -> None:
-    """Refuse to replace an existing file, before any work is done.
+    """Refuse to replace an existing file, before any work is done, and claim it for this run.
 
     Raises `OutputKeptError`, whatever `overwrite` is, when it `is_foreign`: a recording or a
-    character that came from elsewhere cannot be made anew. Else raises `OutputExistsError` unless
-    `overwrite` is set.
+    character that came from elsewhere cannot be made anew; or when it is no file at all, but a
+    folder, a pipe or a device. Else raises `OutputExistsError` unless `overwrite` is set, and
+    `InputError` when another run writes it; see `facert.io.claims`.
     """
+    require_free(path, overwrite)
+    claim(path)
+
+
+def require_free(path: Path, overwrite: bool) -> None:
+    """Refuse what `require_replaceable` refuses, without a claim."""
+    kind = _kind_of_place(path)
+    if kind:
+        raise OutputKeptError(path, f"it is {kind}")
     if is_foreign(path):
         raise OutputKeptError(path)
     if path.exists() and not overwrite:
         raise OutputExistsError(path)
+    if path.is_symlink() and not overwrite:
+        raise OutputExistsError(path, "it is a link to a file that is not there")
+
+
+def _kind_of_place(path: Path) -> str:
+    """What stands at the place of a file that is none; empty for a file, or nothing."""
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        return "a link that leads nowhere" if error.errno == errno.ELOOP else ""
+    if stat.S_ISREG(mode):
+        return ""
+    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    return kinds.get(stat.S_IFMT(mode), "a device")
 
 
 def output_format(path: Path, *kinds: Kind) -> Format:

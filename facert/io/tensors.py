@@ -18,7 +18,7 @@ from safetensors.numpy import load, save
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import write_bytes
 from facert.io.guarded import moderate_file, read_beginning
 
 MAX_HEADER = 16 << 20  # bytes
@@ -41,9 +41,9 @@ def write_tensors(
     contiguous = {
         name: np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()
     }
-    with replacing(path, overwrite) as temporary:
-        # Not save_file: it makes the file readable by its owner alone, whatever the umask.
-        temporary.write_bytes(save(contiguous, {_KEY: json.dumps(metadata, sort_keys=True)}))
+    # Not save_file: it makes the file readable by its owner alone, whatever the umask.
+    content = save(contiguous, {_KEY: json.dumps(metadata, sort_keys=True)})
+    write_bytes(content, path, overwrite)
 
 
 def read_tensors(path: Path, expected: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:

@@ -6,7 +6,10 @@ among what facert needs, so it may have to be installed.
 
 from __future__ import annotations
 
+import errno
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +41,7 @@ def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
     Usd, UsdGeom, UsdSkel = _pxr()
     if not len(morphs.neutral.faces):
         raise InputError("/faces", "triangles", "none", "Give a mesh with faces.", str(path))
-    with replacing(path, overwrite) as temporary:
+    with replacing(path, overwrite) as temporary, _errors_of_usd():
         stage = Usd.Stage.CreateNew(str(temporary))
         UsdGeom.SetStageUpAxis(stage, "Y")
         UsdGeom.SetStageMetersPerUnit(stage, in_metres(morphs.neutral.units) or 1.0)
@@ -51,6 +54,18 @@ def write_usd(morphs: Morphs, path: Path, overwrite: bool = False) -> None:
         _blend_shapes(stage, mesh, morphs, tokens)
         _mark(stage.GetRootLayer())
         stage.GetRootLayer().Save()
+
+
+@contextmanager
+def _errors_of_usd() -> Iterator[None]:
+    """The errors of the file system that USD reports in its own way, as OSError."""
+    from pxr import Tf
+
+    try:
+        yield
+    except Tf.ErrorException as error:
+        said = str(error).partition("\n")[0].rpartition(" : ")[2].strip("' ")  # after the place
+        raise OSError(errno.EIO, f"USD: {said or 'cannot be written'}") from error
 
 
 def bears_mark(path: Path) -> bool:

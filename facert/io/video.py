@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import errno
+import re
+import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
+from fractions import Fraction
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.errors import FacertError, InputError
-from facert.io.atomic import replacing
+from facert.errors import InputError
+from facert.io.atomic import replacing, write_bytes
+from facert.io.registry import require_replaceable
 
 ENDINGS = (".gif", ".mp4")
 _COLOURS = 128
-_QUALITY = 7  # of 10
+_QUALITY = "15"  # the constant rate factor of H.264: 0 is lossless, 51 worst
 
 Pictures = Iterator[NDArray[np.uint8]]
 
@@ -45,11 +52,11 @@ def write_clip(pictures: Pictures, path: Path, fps: float, overwrite: bool = Fal
     if writer is None:
         known = " or ".join(ENDINGS)
         raise InputError("output", known, repr(path.suffix), "Give another name.", str(path))
-    with replacing(path, overwrite) as temporary:
-        writer(pictures, temporary, fps)
+    require_replaceable(path, overwrite)
+    writer(pictures, path, fps, overwrite)
 
 
-def _write_gif(pictures: Pictures, path: Path, fps: float) -> None:
+def _write_gif(pictures: Pictures, path: Path, fps: float, overwrite: bool) -> None:
     """Write a GIF with the colours of the first picture in all, so that nothing flickers."""
     from PIL import Image
 
@@ -57,23 +64,39 @@ def _write_gif(pictures: Pictures, path: Path, fps: float) -> None:
     first = next(images).quantize(_COLOURS)
     others = (image.quantize(palette=first, dither=Image.Dither.NONE) for image in images)
     duration = max(20, 10 * round(100 / fps))  # milliseconds; viewers slow down shorter ones
-    first.save(path, save_all=True, append_images=others, duration=duration, loop=0)
+    content = BytesIO()
+    first.save(content, "GIF", save_all=True, append_images=others, duration=duration, loop=0)
+    write_bytes(content.getvalue(), path, overwrite)
 
 
-def _write_mp4(pictures: Pictures, path: Path, fps: float) -> None:
-    from imageio_ffmpeg import write_frames
+def _write_mp4(pictures: Pictures, path: Path, fps: float, overwrite: bool) -> None:
+    with replacing(path, overwrite) as temporary:
+        _code(pictures, temporary, fps)
+
+
+def _code(pictures: Pictures, path: Path, fps: float) -> None:
+    """Have ffmpeg write an MP4; raises OSError with what it says when it cannot."""
+    from imageio_ffmpeg import get_ffmpeg_exe
 
     first = next(pictures)
     height, width, _ = first.shape
-    writer = write_frames(
-        str(path), (width, height), fps=fps, quality=_QUALITY, macro_block_size=2,
-        codec="libx264", ffmpeg_log_level="error",
-    )  # fmt: skip
-    try:
-        writer.send(None)
-        for picture in chain([first], pictures):
-            writer.send(np.ascontiguousarray(picture))
-    except (OSError, RuntimeError) as error:
-        raise FacertError(f"{path.name}: ffmpeg could not write the video: {error}") from error
-    finally:
-        writer.close()
+    rate = str(Fraction(fps).limit_denominator())
+    raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", rate)
+    coded = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", _QUALITY)
+    command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, str(path))
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
+    ) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        try:
+            with suppress(BrokenPipeError), process.stdin:  # ffmpeg says why it ended
+                for picture in chain([first], pictures):
+                    process.stdin.write(np.ascontiguousarray(picture).data)
+            message = process.stderr.read().decode(errors="replace")
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        said = re.sub(r"\[.*?\] ", "", message.partition("\n")[0]).replace(str(path), "it")
+        raise OSError(errno.EIO, f"ffmpeg: {said or f'status {process.returncode}'}")

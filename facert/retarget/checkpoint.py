@@ -12,6 +12,8 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.version import CREATED_BY
 from facert.errors import InputError
+from facert.io.atomic import Appended, write_text
+from facert.io.guarded import read_text
 from facert.io.registry import require_replaceable
 from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import read_tensors, write_tensors
@@ -125,30 +127,19 @@ class CurveLog(Monitor):
         self._began = time.perf_counter()
 
     def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  only begins the file
-        """Begin the file: training is about to start."""
-        if self._goes_on:
-            return None
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text(f"{CURVE}\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(
-                "--log",
-                "a file that can be written",
-                f"{error.strerror}",
-                "Choose another place.",
-                str(self.path),
-            ) from error
+        """Begin the file: training is about to start. A line that a killed run cut off goes."""
+        lines = read_text(self.path).splitlines(keepends=True) if self._goes_on else []
+        whole = "".join(line for line in lines if line.endswith("\n"))
+        write_text(whole or f"{CURVE}\n", self.path, overwrite=True)
         return None
 
     def iteration(self, state: State) -> None:
         """Append the line of an iteration."""
         seconds = time.perf_counter() - self._began
         # Closed after each line: the log can be followed, and survives a killed run.
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(
-                f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
-            )
+        line = f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
+        with Appended(self.path) as file:
+            file.add(line.encode())
 
 
 class Monitors(Monitor):

@@ -231,12 +231,6 @@ def _require_output(output: Path, curve: Path | None) -> None:
         raise InputError("--output", "a name ending in .safetensors", str(output), "Rename it.")
     if curve is not None and curve.suffix == ".safetensors":
         raise InputError("--log", "a name such as curve.csv", str(curve), "Rename it.")
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            "--output", "a folder that can be made", f"{error.strerror}", "Choose another place."
-        ) from error
 
 
 def _print_table(retargeter: Retargeter, output: Path) -> None:

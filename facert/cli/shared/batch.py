@@ -16,7 +16,8 @@ from facert.cli.shared.in_and_out import SWAPPED, require_in_and_out
 from facert.data.subject import about
 from facert.errors import FacertError, InputError, OutputExistsError, OutputKeptError
 from facert.evaluation.processes import call_each, cores
-from facert.io.registry import Kind, output_format, require_replaceable
+from facert.io.claims import claim, claims_kept
+from facert.io.registry import Kind, output_format, require_free
 
 Thing = TypeVar("Thing")
 Work = Callable[[Path, Path], Thing]
@@ -130,7 +131,7 @@ def _writable(
     wanted, failed = [], 0
     for source, output in pairs:
         try:
-            require_replaceable(output, overwrite)
+            require_free(output, overwrite)
         except OutputKeptError as error:
             failed += 1
             console.show(f"failed  {source}: {error}")
@@ -173,7 +174,8 @@ def _attempt(work: Work[Any], source: Path, output: Path) -> tuple[Path, Any, st
     Whatever is logged meanwhile names the file.
     """
     try:
-        with about(str(source)):
+        with about(str(source)), claims_kept():
+            claim(output)
             return source, work(source, output), None
     except FacertError as error:
         text = str(error)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from facert.cli.shared import console
 from facert.errors import InputError, OutputKeptError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import write_bytes, write_text
 from facert.io.registry import require_replaceable
 
 if TYPE_CHECKING:
@@ -183,8 +184,9 @@ def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
     from facert.render.texts import take_texts_as_they_are
 
     take_texts_as_they_are(figure)
-    with replacing(path, overwrite) as temporary:
-        figure.savefig(temporary)
+    content = io.BytesIO()
+    figure.savefig(content, format=path.suffix[1:].lower())
+    write_bytes(content.getvalue(), path, overwrite)
 
 
 def save_json(content: Mapping[str, object], path: Path, overwrite: bool) -> None:
@@ -197,8 +199,7 @@ def save_json(content: Mapping[str, object], path: Path, overwrite: bool) -> Non
 
 def save_text(text: str, path: Path, overwrite: bool) -> None:
     """Write text in UTF-8."""
-    with replacing(path, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(text, path, overwrite)
 
 
 def warn_of_unit(unit: str) -> None:

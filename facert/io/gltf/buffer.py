@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
-from facert.io.atomic import replacing
+from facert.io.atomic import writing
 from facert.io.gltf.container import BINARY, JSON, MAGIC
 
 _TYPES = {np.dtype("<f4"): 5126, np.dtype("<u4"): 5125}
@@ -98,8 +98,9 @@ def write_container(
     if total > _LARGEST:
         fix = "Choose fewer frames, or a larger tolerance."
         raise InputError("output", "at most 4 GiB", f"{total} bytes", fix, str(path))
-    with replacing(path, overwrite) as temporary, temporary.open("wb") as file:
+    with writing(path, overwrite) as file:
         file.write(struct.pack("<III", MAGIC, 2, total))
         file.write(struct.pack("<II", len(text), JSON) + text)
         file.write(struct.pack("<II", buffer.size, BINARY))
-        file.writelines([*buffer.parts, others])
+        for part in (*buffer.parts, others):
+            file.write(part)

@@ -30,7 +30,7 @@ from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_columns
 from facert.data.text import printable
 from facert.errors import InputError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import write_text
 from facert.io.guarded import encoding_of, read_beginning, read_text
 from facert.io.lines import (
     MAX_HEADER,
@@ -120,9 +120,8 @@ def write_table(take: Take, path: Path, overwrite: bool = False) -> None:
     mark = _MARKS["markers" if markers else "weights"]
     plain = _header(["time", *names])
     own = _is_own(plain) and _reads_back(names, take.time, values, markers)
-    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        file.write(plain if own else _header([mark, *names]))
-        file.write(_body(take.time, values).replace("nan", ""))
+    header = plain if own else _header([mark, *names])
+    write_text(header + _body(take.time, values).replace("nan", ""), path, overwrite)
     if take.start_timecode:
         log.info("a table has no start timecode: %s is left out", printable(take.start_timecode))
 

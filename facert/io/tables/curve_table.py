@@ -25,7 +25,7 @@ from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError
-from facert.io.atomic import replacing
+from facert.io.atomic import write_text
 from facert.io.guarded import read_beginning
 from facert.io.lines import check_width, parse_csv, to_numbers
 
@@ -49,8 +49,7 @@ def write_curve_table(take: Take, path: Path, overwrite: bool = False) -> None:
         raise InputError("/time", "times apart in single precision", "two that are one", fix)
     is_json = path.suffix.lower() == ".json"
     text = _json(names, time, values) if is_json else _csv(names, time, values)
-    with replacing(path, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="")
+    write_text(text, path, overwrite)
 
 
 def is_curve_table(header: Sequence[str]) -> bool:

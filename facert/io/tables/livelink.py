@@ -12,6 +12,7 @@ file does, its rows show: see `facert.data.timecode_column`.
 from __future__ import annotations
 
 import csv
+import io
 import logging
 import re
 from collections.abc import Sequence
@@ -38,7 +39,7 @@ from facert.data.timecode import (
 )
 from facert.data.timecode_column import TimecodeClock, read_timecodes
 from facert.errors import InputError, reading
-from facert.io.atomic import replacing
+from facert.io.atomic import write_text
 from facert.io.guarded import read_beginning
 from facert.io.lines import Line, check_width, read_csv, to_numbers, without_cut_end
 
@@ -107,10 +108,11 @@ def write_livelink(take: Take, path: Path, overwrite: bool = False) -> None:
     with reading(path):
         codes, columns = _timecodes(take), _known_columns(take)
     known = np.asarray(~np.isnan(columns).all(axis=1))
-    with replacing(path, overwrite) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
-        writer.writerows(_rows(codes, columns, known))
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow([*_LEADING, *(name[0].upper() + name[1:] for name in ARKIT_NAMES)])
+    writer.writerows(_rows(codes, columns, known))
+    write_text(table.getvalue(), path, overwrite)
     if not known.all():
         unposed = plural(int(np.sum(~known)), "frame")
         log.info("%s without a pose: rows without a face", unposed)
