@@ -182,6 +182,8 @@ def _is_upper(group: BoolArray, sample: TakeSample, named: FloatArray) -> bool:
 
     Controls with a side by name must be predicted by it, and the side whose controls move more has
     the markers that do. Without such names it is the calmer group: nothing moves as a jaw does.
+    Each term changes its sign with the group: which of the two comes first, an eigenvector's sign
+    has decided, and that is up to rounding.
     """
     spread = sample.frames.var(axis=0).reshape(len(group), -1).sum(axis=1)
     calm = _log_ratio(spread[~group].max(), spread[group].max())
@@ -191,7 +193,8 @@ def _is_upper(group: BoolArray, sample: TakeSample, named: FloatArray) -> bool:
     moved = sample.poses.var(axis=0)
     closer = sample.log_errors(~group) - sample.log_errors(group)
     expected = _log_ratio(moved[lower].max(), moved[upper].max())
-    return bool(closer[upper].mean() - closer[lower].mean() + CALM * (calm - expected) > 0)
+    fit = 0.5 * (abs(calm + expected) - abs(calm - expected))
+    return bool(closer[upper].mean() - closer[lower].mean() + CALM * fit > 0)
 
 
 def _log_ratio(one: float, other: float) -> float:

@@ -17,6 +17,8 @@ from facert.preprocess.clean_source import SourceOptions
 LARGEST = 1e6
 """Beyond, a gain or a limit is a slip of the pen."""
 ENTRIES = ("gain", "limits", "smoothing")
+ROUNDING = 1e-14
+"""Of a bound and the mean pose: what units may change in a pose on its way there and back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ class PoseScale:
 
     A pose is brought to the controls' units, clipped to the model's bounds, multiplied by the gain
     and clipped to the limits; with the bounds times the gain, that is one product, one sum and one
-    clip.
+    clip. A pose that a method has put at its bound is there again, not a rounding short of it.
 
     Parameters
     ----------
@@ -129,14 +131,16 @@ class PoseScale:
         self._std_scale = units.scale * np.abs(gain)
         ends = np.tile([[-np.inf], [np.inf]], len(gain)) if bounds is None else bounds.T
         moved = np.where(gain == 0.0, 0.0, ends * np.where(gain == 0.0, 1.0, gain))  # 0 inf is NaN
-        self._low, self._high = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
+        self._low, self._high = ends = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
+        sizes = np.abs(np.where(np.isfinite(ends), ends, 0.0)) + np.abs(self._offset)
+        self._near_low, self._near_high = ends + ROUNDING * sizes * [[1.0], [-1.0]]
 
     def params(self, Y: FloatArray) -> FloatArray:
         """Values of the controls from normalised poses, (T, P) or (P,)."""
         params = Y * self._scale
         params += self._offset
-        np.maximum(params, self._low, out=params)
-        np.minimum(params, self._high, out=params)
+        np.copyto(params, self._low, where=params < self._near_low)
+        np.copyto(params, self._high, where=params > self._near_high)
         return params
 
     def std(self, std: FloatArray | None) -> FloatArray | None:

@@ -7,6 +7,7 @@ import pytest
 
 from facert import Controls, InputError, Settings, Source, Take, train
 from facert.regions.automatic import BETWEEN, LOWER, UPPER, find_regions, sides_by_name
+from facert.regions.bipartition import two_groups
 from facert.retarget.options import AS_IT_IS
 
 CONTROLS = ("browInnerUp", "eyeBlink_L", "eyeBlink_R", "jawOpen", "mouthSmile", "mouthPucker")
@@ -53,6 +54,22 @@ def test_brows_and_mouth_come_apart(seed, together):
     assert found[UPPER].controls == UPPER_CONTROLS
     assert found[LOWER].controls == LOWER_CONTROLS
     assert BETWEEN not in found
+
+
+@pytest.mark.parametrize("controls", [CONTROLS, [f"control{i}" for i in range(6)]])
+@pytest.mark.parametrize("brows_move", [1.0, 30.0])
+def test_which_group_comes_first_does_not_matter(monkeypatch, controls, brows_move):
+    """The groups follow an eigenvector's sign, which differs between machines."""
+    take, _, _ = make_face(controls, together=0.95)
+    values, params = take.source.values.copy(), take.params.copy()
+    values[:, 8:] = values[0, 8:] + brows_move * (values[:, 8:] - values[0, 8:])
+    params[:, :3] *= brows_move
+    take = replace(take, source=replace(take.source, values=values), params=params)
+    found = find_regions(take)
+    monkeypatch.setattr(
+        "facert.regions.automatic.two_groups", lambda frames: ~two_groups(frames)
+    )
+    assert find_regions(take) == found
 
 
 def test_names_without_a_side_leave_it_to_the_labels():
