@@ -19,6 +19,8 @@ LARGEST = 1e6
 ENTRIES = ("gain", "limits", "smoothing")
 ROUNDING = 1e-14
 """Of a bound and the mean pose: what units may change in a pose on its way there and back."""
+FAR = 1e100
+"""As good as infinite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,17 +133,26 @@ class PoseScale:
         self._std_scale = units.scale * np.abs(gain)
         ends = np.tile([[-np.inf], [np.inf]], len(gain)) if bounds is None else bounds.T
         moved = np.where(gain == 0.0, 0.0, ends * np.where(gain == 0.0, 1.0, gain))  # 0 inf is NaN
-        self._low, self._high = ends = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
-        sizes = np.abs(np.where(np.isfinite(ends), ends, 0.0)) + np.abs(self._offset)
-        self._near_low, self._near_high = ends + ROUNDING * sizes * [[1.0], [-1.0]]
+        self._low, self._high = np.clip(np.sort(moved, axis=0), *adjustments.limits.T)
+        self._stretch()
 
     def params(self, Y: FloatArray) -> FloatArray:
         """Values of the controls from normalised poses, (T, P) or (P,)."""
         params = Y * self._scale
         params += self._offset
-        np.copyto(params, self._low, where=params < self._near_low)
-        np.copyto(params, self._high, where=params > self._near_high)
+        np.maximum(params, self._low, out=params)
+        np.minimum(params, self._high, out=params)
         return params
+
+    def _stretch(self) -> None:
+        """Widen the poses about the middle by a rounding, so that what is at a bound is cut."""
+        ends = np.stack([self._low, self._high])
+        size = np.abs(np.where(np.isfinite(ends), ends, 0.0)).max(axis=0) + np.abs(self._offset)
+        low, high = np.clip(ends, -FAR, FAR)
+        half = np.where(high > low, 0.5 * (high - low), np.inf)
+        share = ROUNDING * size / half
+        self._offset = self._offset + share * (self._offset - 0.5 * (low + high))
+        self._scale = self._scale * (1.0 + share)
 
     def std(self, std: FloatArray | None) -> FloatArray | None:
         """Standard deviation of poses from that of normalised ones, (T, P) or (P,)."""

@@ -66,9 +66,7 @@ def test_which_group_comes_first_does_not_matter(monkeypatch, controls, brows_mo
     params[:, :3] *= brows_move
     take = replace(take, source=replace(take.source, values=values), params=params)
     found = find_regions(take)
-    monkeypatch.setattr(
-        "facert.regions.automatic.two_groups", lambda frames: ~two_groups(frames)
-    )
+    monkeypatch.setattr("facert.regions.automatic.two_groups", lambda frames: ~two_groups(frames))
     assert find_regions(take) == found
 
 

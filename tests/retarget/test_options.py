@@ -32,7 +32,7 @@ def test_gain_comes_before_limits():
 def test_a_normalised_pose_at_its_bound_is_the_bound_itself(gain):
     """Whatever rounding makes of it on the way to normalised units and back."""
     rng = np.random.default_rng(0)
-    means, scales = rng.normal(size=(200, 4)), rng.uniform(0.1, 30.0, 200)
+    means, scales = 10.0 * rng.normal(size=(200, 4)), rng.uniform(0.1, 30.0, 200)
     bounds = np.sort(rng.normal(size=(4, 2)), axis=1)
     bounds[0, 0], bounds[1, 1] = -np.inf, np.inf
     adjustments = Adjustments.of({name: {"gain": gain} for name in NAMES}, NAMES)
@@ -43,7 +43,9 @@ def test_a_normalised_pose_at_its_bound_is_the_bound_itself(gain):
         np.testing.assert_array_equal(found, gain * bounds.T)
         inside = 0.5 * (np.clip(at_bounds[:1], -3.0, 3.0) + np.clip(at_bounds[1:], -3.0, 3.0))
         kept = PoseScale(units, bounds, adjustments).params(inside)
-        np.testing.assert_allclose(kept, np.clip(gain * units.undo(inside), *np.sort(found, axis=0)))
+        np.testing.assert_allclose(
+            kept, np.clip(gain * units.undo(inside), *np.sort(found, axis=0))
+        )
 
 
 def test_names_are_found_in_any_spelling_and_by_wildcards():
