@@ -16,6 +16,9 @@ from facert.preprocess.motion.motion import Motion
 from facert.preprocess.source_layout import SourceLayout
 from facert.settings import Settings
 
+OF_A_RUN = ("seconds",)
+"""Figures of one run of a training: no two are alike."""
+
 
 @dataclass(frozen=True)
 class TrainedModel:
@@ -106,12 +109,15 @@ class TrainedModel:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """Names, units, settings and figures of the model, as plain values."""
+        """Names, units, settings and figures of the model, as plain values.
+
+        They depend on what it learned from alone: the same training gives the same file.
+        """
         return {
             "source_kind": self.source_kind,
             "source_names": list(self.source_names),
             "units": self.units,
             "target_names": list(self.controls.names),
             "settings": self.settings.as_dict(),
-            "figures": self.figures,
+            "figures": {n: value for n, value in self.figures.items() if n not in OF_A_RUN},
         }

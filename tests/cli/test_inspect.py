@@ -58,12 +58,12 @@ def test_of_a_model_the_settings_are_shown_that_its_method_uses(
     train(make_take(), settings).save(model)
     shown = facert("inspect", model).out
     assert "settings limits" in shown
-    assert "training seconds" in shown
+    assert "labelled frames" in shown
     for name in ("latent dim", "inducing", "sigma c"):
         assert (f"settings {name}" in shown) == shared
     facts = json.loads(facert("inspect", model, "--json").out)
     assert facts["settings"]["latent_dim"] == 2  # programs get everything
-    assert facts["figures"]["seconds"] > 0.0
+    assert facts["figures"]["labelled frames"] == 12
 
 
 def test_a_missing_file_is_bad_input(facert, tmp_path):
