@@ -68,8 +68,6 @@ def run(
     ------
     InputError
         When the take is too short for the largest cell.
-    FacertError
-        When a process was killed.
     """
     for repeat in range(min(grid.repeats, 2)):  # the two halves of a split by blocks
         draw(problem, max(grid.labels), max(grid.unlabelled), repeat)
@@ -79,7 +77,8 @@ def run(
     yield from kept
     done = {outcome.cell for outcome in kept}
     waiting = [cell for cell in cells if cell not in done]
-    for outcome in call_each(evaluate, [(problem, cell, settings) for cell in waiting], jobs):
+    calls = [(problem, cell, settings) for cell in waiting]
+    for outcome in call_each(evaluate, calls, jobs, lost=_lost):
         if outcome.details:
             log.debug("%s\n%s", outcome.cell, outcome.details)
         elif journal is not None:
@@ -120,6 +119,11 @@ def _kept(journal: Journal | None, wanted: set[Cell]) -> list[Outcome]:
     if kept:
         log.info("%d of %d cells are done, in %s", len(kept), len(wanted), journal.path)
     return kept
+
+
+def _lost(_problem: Problem, cell: Cell, _settings: Settings, reason: str) -> Outcome:
+    """The outcome of a cell whose process died; it is tried again by the next run."""
+    return Outcome(cell, failure=reason, details=reason)
 
 
 def _add_take(digest: hashlib._Hash, take: Take) -> None:

@@ -8,8 +8,9 @@ import time
 from pathlib import Path
 
 import pytest
+from calls import deed, reason_of, refuse
 
-from facert.errors import FacertError
+from facert.errors import FacertError, InputError
 from facert.evaluation.processes import call_each
 
 
@@ -24,21 +25,44 @@ def test_a_process_that_was_killed_is_a_line_of_advice():
         list(call_each(os._exit, [(1,), (1,)], jobs=2))
 
 
-@pytest.mark.slow
+def test_a_process_that_dies_costs_its_call_alone(tmp_path):
+    calls = [(tmp_path, "a"), (tmp_path, "once", 1), (tmp_path, "ever", 9), (tmp_path, "z")]
+    a, z, once, ever = call_each(deed, calls, 2, lost=reason_of)
+    assert {a, z} == {"a", "z"}
+    assert (once, ever[:47]) == ("once", "ever: a process was killed; it ended by SIGKILL")
+    assert len(list(tmp_path.glob("ever-*"))) == 2
+
+
+def test_what_a_call_raises_is_raised_here(capfd):
+    with pytest.raises(InputError, match=r"number: expected another, found 1"):
+        list(call_each(refuse, [(1,), (1,)], 2))
+    assert capfd.readouterr().out == ""
+
+
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="the system has no /proc")
-def test_processes_end_with_a_parent_that_was_killed():
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_processes_end_with_their_parent(tmp_path, number):
     code = (
-        "import time; from facert.evaluation.processes import call_each\n"
-        "import os; print(*call_each(os.getpid, [(), ()], 2), flush=True)\n"
-        "list(call_each(time.sleep, [(60,), (60,)], 2))"
+        "import pathlib, sys; from calls import cleaning_up\n"
+        "from facert.evaluation.processes import call_each\n"
+        "from facert.cli.shared.signals import signals; signals.install()\n"
+        "folder = pathlib.Path(sys.argv[1])\n"
+        "with signals.raising(): list(call_each(cleaning_up, [(folder, 'a'), (folder, 'b')], 2))"
     )
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", code, str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": path},
+        stderr=subprocess.DEVNULL,
     ) as parent:
-        children = set(parent.stdout.readline().split())
-        time.sleep(0.5)
-        os.kill(parent.pid, signal.SIGKILL)
-    until = time.monotonic() + 20
-    while any(Path(f"/proc/{child}/fd/0").exists() for child in children):
+        while len(list(tmp_path.iterdir())) < 2:
+            time.sleep(0.01)
+        children = Path(f"/proc/{parent.pid}/task").glob("*/children")
+        workers = " ".join(each.read_text() for each in children).split()
+        assert len(workers) == 2
+        parent.send_signal(number)
+    until = time.monotonic() + 10
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
         assert time.monotonic() < until
-        time.sleep(0.1)
+        time.sleep(0.01)
+    assert bool(list(tmp_path.iterdir())) == (number == signal.SIGKILL)

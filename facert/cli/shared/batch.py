@@ -11,10 +11,11 @@ from typing import Any, TypeVar
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.failures import described, is_unexpected, trace
 from facert.cli.shared.files import identity, require_other_file
 from facert.cli.shared.in_and_out import SWAPPED, require_in_and_out
 from facert.data.subject import about
-from facert.errors import FacertError, InputError, OutputExistsError, OutputKeptError
+from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.evaluation.processes import call_each, cores
 from facert.io.claims import claim, claims_kept
 from facert.io.registry import Kind, output_format, require_free
@@ -111,7 +112,7 @@ def carry_out(
         wanted, failed = _writable(todo.pairs, overwrite)
         there = len(todo.pairs) - len(wanted) - failed
         calls, begin = [(work, *pair) for pair in wanted], partial(_begin, console.log.level)
-        for file, thing, error in call_each(_attempt, calls, todo.jobs, begin):
+        for file, thing, error in call_each(_attempt, calls, todo.jobs, begin, _lost):
             failed += error is not None
             console.show(f"failed  {error}" if error else f"done    {file}")
             if error is None:
@@ -177,13 +178,15 @@ def _attempt(work: Work[Any], source: Path, output: Path) -> tuple[Path, Any, st
         with about(str(source)), claims_kept():
             claim(output)
             return source, work(source, output), None
-    except FacertError as error:
-        text = str(error)
-    except OSError as error:
-        text = error.strerror or str(error)
     except Exception as error:  # whatever is wrong with one file, the others are done
-        text = f"unexpected {type(error).__name__}: {error}"
-    return source, None, text if str(source) in text else f"{source}: {text}"
+        if is_unexpected(error):
+            console.log.debug("%s", trace(error))
+        return _lost(work, source, output, described(error))
+
+
+def _lost(_work: Work[Any], source: Path, _output: Path, reason: str) -> tuple[Path, None, str]:
+    """One file that was not done, and the reason in one line."""
+    return source, None, reason if str(source) in reason else f"{source}: {reason}"
 
 
 def _files(path: Path) -> list[Path]:
