@@ -131,6 +131,11 @@ class Appended:
                     self._file.truncate(end)
                 raise
 
+    def content(self) -> bytes:
+        """All that the file holds; Windows apart, also when its name is gone."""
+        self._file.seek(0)
+        return self._file.readall() or b""
+
     def close(self) -> None:
         """Close the file, which stays."""
         self._file.close()

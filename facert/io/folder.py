@@ -15,6 +15,7 @@ from facert.io.gltf.document import open_gltf
 from facert.io.guarded import encoding_of, read_beginning
 from facert.io.hdf5 import TAKE_FORMAT, stated_format
 from facert.io.lines import separator_of
+from facert.io.live_recording import ENDING
 from facert.io.npz import kind_of as kind_of_archive
 from facert.io.registry import OWN_ENDINGS, format_of
 from facert.io.tables.csv_table import CURVE
@@ -61,6 +62,8 @@ def _is_take(path: Path) -> bool:
 
 def _is_other(path: Path, endings: tuple[str, ...]) -> bool:
     """Whether a file of a format that takes come in is known to be something else."""
+    if ENDING in endings:  # it goes on, or waits for its session to be begun again
+        return True
     if OWN_ENDINGS[0] in endings:
         return stated_format(path) not in ("", TAKE_FORMAT)
     if ".npz" in endings:

@@ -179,6 +179,12 @@ FORMATS = (
     Format((".obj",), {"mesh": "obj.read_obj"}, reads="a mesh at rest, for `drive`"),
     Format((".ply",), {"mesh": "ply.read_ply"}, reads="a mesh at rest, for `drive`"),
     Format(
+        (".recording",),
+        {"take": "live_recording.read_recording"},
+        mark="live_recording.bears_mark",
+        reads="what `live` recorded until its session was killed",
+    ),
+    Format(
         (".safetensors",),
         mark="tensors.bears_mark",
         reads="a model, by `--model`",

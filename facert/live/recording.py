@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import itertools
 import logging
-import tempfile
-from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.rate import nominal_rate
-from facert.data.take import Controls, Source, Take
-from facert.errors import FacertError, InputError
+from facert.data.take import Controls, Take
+from facert.errors import FacertError, InputError, OutputKeptError
+from facert.io.claims import claimed
 from facert.io.formats import write_take_file
+from facert.io.live_recording import LiveRecording, read_recording, recording_of
 from facert.io.registry import is_foreign, require_replaceable
 from facert.live.frames import Frame, frame_pattern
 
@@ -26,41 +28,12 @@ if TYPE_CHECKING:
 log = logging.getLogger("facert")
 
 
-class SpooledRows:
-    """Rows of equal length in a nameless file, so that memory does not grow with time."""
-
-    def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115
-        self._full = False
-        self._width = 0
-        self.count = 0
-
-    def add(self, row: FloatArray) -> None:
-        """Keep one more row; when the disk is full, no more, with a warning: the show goes on."""
-        if self._full:
-            return
-        try:
-            self._file.write(row.tobytes())
-            self.count, self._width = self.count + 1, len(row)
-        except OSError as error:
-            self._full = True
-            log.warning("recorded no further than %d frames: %s", self.count, error.strerror)
-
-    def close(self) -> None:
-        """Discard all rows."""
-        self._file.close()
-
-    def read(self) -> FloatArray:
-        """Read all rows, (count, width)."""
-        self._file.seek(0)
-        whole = np.frombuffer(self._file.read(8 * self.count * self._width))
-        return whole.reshape(self.count, self._width)
-
-
-class _Record(ABC):
+class _Record:
     """A take that is written when the performance is over, and must not fail then.
 
-    So a take of the same kind is written at once, beside the file's place, and removed.
+    So a take of the same kind is written at once elsewhere, and the output is claimed. Until the
+    end all frames are in a file of their own beside it, which stays when the session is killed: the
+    next session with that output makes a take of it.
 
     Parameters
     ----------
@@ -69,6 +42,8 @@ class _Record(ABC):
         Allow to replace a file that exists.
     like : Take
         A take with the names, units and controls of the record, whatever its frames.
+    start_timecode : callable
+        Asked with the first frame for its timecode.
 
     Raises
     ------
@@ -78,69 +53,96 @@ class _Record(ABC):
         When the format cannot hold such a take, or nothing can be written there.
     """
 
-    def __init__(self, path: Path, overwrite: bool, like: Take) -> None:
+    def __init__(
+        self, path: Path, overwrite: bool, like: Take, start_timecode: Callable[[], str]
+    ) -> None:
         self._path, self._overwrite, self._like = path, overwrite, like
-        self._rehearse()
-        self._rows = SpooledRows()
+        self._full = False
+        require_replaceable(path, overwrite)
+        with TemporaryDirectory() as folder:
+            write_take_file(like, Path(folder) / path.name)
+        with ExitStack() as stack:
+            stack.enter_context(claimed(path))
+            _recover(path)
+            self._rows = LiveRecording(recording_of(path), like, start_timecode)
+            self._stack = stack.pop_all()
+
+    @property
+    def recording(self) -> Path:
+        """The file of all frames until the end."""
+        return self._rows.path
 
     def close(self) -> None:
-        """Discard what was not written."""
+        """Let go of the file of all frames; it stays where no take was made of it."""
         self._rows.close()
+        self._stack.close()
 
     def write(self, start_timecode: str) -> Path | None:
-        """Write the take, as HDF5 where the format cannot hold it.
+        """Write the take, as HDF5 where the format cannot hold it, and let go of the output.
 
         Returns
         -------
         Path or None
             Where it is; None when there was no frame.
         """
+        with self._stack:
+            return self._written(start_timecode)
+
+    def _written(self, start_timecode: str) -> Path | None:
         if not self._rows.count:
             log.warning("%s: not written, as there was no frame", self._path)
+            self._rows.remove()
             return None
-        table = self._rows.read()
-        time = table[:, 0] - table[0, 0]
-        fields = self._fields(table[:, 1:])
-        take = replace(
-            self._like, time=time, fps=nominal_rate(time), start_timecode=start_timecode, **fields
-        )
+        take = replace(self._rows.take(), start_timecode=start_timecode)
+        place = self._path if self._overwrite and not is_foreign(self._path) else _free(self._path)
+        if place != self._path:
+            log.warning("%s appeared meanwhile: written to %s", self._path, place)
         try:
-            return self._write(take, self._path)
+            written = _write(take, place, self._overwrite)
         except InputError as error:
-            instead = self._write(take, self._path.with_name(f"{self._path.name}.h5"))
-            log.warning("written to %s instead: %s", instead, error)
-            return instead
+            if self.recording.exists():
+                error.fix += f" All frames are in {self.recording}, which facert reads."
+            raise
+        self._rows.remove()
+        return written
 
-    @abstractmethod
-    def _fields(self, table: FloatArray) -> dict[str, Any]:
-        """The take's frames, from the rows without their times, (T, width - 1)."""
-
-    def _source(self, values: FloatArray) -> Source:
-        like = self._like.source
-        return Source(values.reshape(-1, *like.values.shape[1:]), like.names)
-
-    def _rehearse(self) -> None:
-        require_replaceable(self._path, self._overwrite)
+    def _add(self, row: FloatArray) -> None:
+        """Keep a row; when the disk is full, no more, with a warning: the show goes on."""
+        if self._full:
+            return
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=self._path.parent) as folder:
-                write_take_file(self._like, Path(folder) / self._path.name)
-        except OSError as error:
-            raise InputError(
-                "output",
-                "a folder that can be written to",
-                error.strerror or str(error),
-                "Choose another place.",
-                str(self._path),
-            ) from error
+            self._rows.add(row)
+        except InputError as error:
+            self._full = True
+            log.warning("recorded no further than %d frames: %s", self._rows.count, error.found)
 
-    def _write(self, take: Take, path: Path) -> Path:
-        """Write the take beside a file that appeared meanwhile: both are precious."""
-        place = path if self._overwrite and not is_foreign(path) else _free(path)
-        write_take_file(take, place, self._overwrite)
-        if place != path:
-            log.warning("%s appeared meanwhile: written to %s", path, place)
-        return place
+
+def _write(take: Take, path: Path, overwrite: bool) -> Path:
+    """Write a take, as HDF5 where the format of the name's ending cannot hold it; return where."""
+    try:
+        write_take_file(take, path, overwrite)
+    except InputError as error:
+        instead = _free(path.with_name(f"{path.name}.h5"))
+        write_take_file(take, instead)
+        log.warning("written to %s instead: %s", instead, error)
+        return instead
+    return path
+
+
+def _recover(path: Path) -> None:
+    """Make a take of what a session left that was killed while it recorded to that path."""
+    left = recording_of(path)
+    if is_foreign(left):
+        raise OutputKeptError(left)
+    if not left.exists() or not left.stat().st_size:
+        return
+    name, dot, endings = path.name.partition(".")
+    take = read_recording(left)
+    written = _write(take, _free(path.with_name(f"{name}-recovered{dot}{endings}")), False)
+    left.unlink()
+    log.warning(
+        "a session was killed: the %d frames that it recorded are in %s", len(take), written
+    )
 
 
 def _free(path: Path) -> Path:
@@ -157,10 +159,7 @@ class SourceRecord(_Record):
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
-        self._rows.add(np.append(frame.time, frame.values))
-
-    def _fields(self, table: FloatArray) -> dict[str, Any]:
-        return {"source": self._source(table)}
+        self._add(np.append(frame.time, frame.values))
 
 
 class PoseRecord(_Record):
@@ -169,14 +168,7 @@ class PoseRecord(_Record):
     def send(self, frame: Frame, pose: Streamed) -> None:
         """Keep a pose, its standard deviation, and its source."""
         std = np.full(len(pose.params), np.nan) if pose.std is None else pose.std
-        self._rows.add(np.concatenate([[frame.time], pose.params, std, pose.source.ravel()]))
-
-    def _fields(self, table: FloatArray) -> dict[str, Any]:
-        assert self._like.controls is not None  # `Recordings.poses` gives them
-        count = len(self._like.controls.names)
-        params, std, values = np.split(table, [count, 2 * count], axis=1)
-        known = None if np.isnan(std).all() else std
-        return {"source": self._source(values), "params": params, "std": known}
+        self._add(np.concatenate([[frame.time], pose.params, std, pose.source.ravel()]))
 
 
 _AnyRecord = TypeVar("_AnyRecord", bound=_Record)
@@ -195,12 +187,20 @@ class Recordings:
         Controls of the poses.
     overwrite : bool
         Allow to replace existing files.
+    start_timecode : callable, optional
+        Asked with the first frame for its timecode.
     """
 
     def __init__(
-        self, incoming: Take, cleaned: tuple[str, ...], controls: Controls, overwrite: bool
+        self,
+        incoming: Take,
+        cleaned: tuple[str, ...],
+        controls: Controls,
+        overwrite: bool,
+        start_timecode: Callable[[], str] = str,
     ) -> None:
         self._incoming, self._overwrite = incoming, overwrite
+        self._start_timecode = start_timecode
         like = frame_pattern(cleaned, incoming.source.kind, incoming.units)
         self._posed = replace(like, controls=controls, params=np.zeros((1, len(controls.names))))
         self._records: dict[Path, _Record] = {}
@@ -234,8 +234,13 @@ class Recordings:
             raise failed[0]
         return [path for path in written if path is not None]
 
+    @property
+    def going_on(self) -> list[Path]:
+        """The files of all frames until the end."""
+        return [record.recording for record in self._records.values()]
+
     def close(self) -> None:
-        """Discard what was not written."""
+        """Close all files; frames that were not written stay where they are."""
         for record in self._records.values():
             record.close()
 
@@ -244,6 +249,6 @@ class Recordings:
             raise InputError(
                 "output", "a file for each recording", "one for two", "Rename one.", str(path)
             )
-        record = kind(path, self._overwrite, like)
+        record = kind(path, self._overwrite, like, self._start_timecode)
         self._records[path.absolute()] = record
         return record

@@ -1,3 +1,5 @@
+import resource
+import shutil
 from contextlib import ExitStack, closing
 from dataclasses import replace
 
@@ -7,6 +9,8 @@ import pytest
 import facert
 from facert.data.take import Controls
 from facert.errors import InputError, OutputExistsError, OutputKeptError
+from facert.io.folder import takes_in
+from facert.io.formats import read_take_file
 from facert.live.frames import Frame, frame_pattern
 from facert.live.recording import Recordings
 from facert.retarget.stream import Streamed
@@ -151,8 +155,72 @@ def test_one_file_that_fails_does_not_take_the_others_along(recordings, tmp_path
     first, second = files.source(tmp_path / "gone" / "in.h5"), files.source(tmp_path / "in.h5")
     for record in (first, second):
         record.add(WEIGHTS[0])
-    (tmp_path / "gone").rmdir()
+    shutil.rmtree(tmp_path / "gone")
     (tmp_path / "gone").write_text("in the way")
     with pytest.raises(InputError):
         files.write("")
     assert len(facert.read_take(tmp_path / "in.h5")) == 1
+
+
+@pytest.mark.parametrize("frames", [WEIGHTS, MARKERS])
+def test_what_a_killed_session_recorded_is_there_and_the_next_one_keeps_it(
+    recordings, tmp_path, caplog, frames
+):
+    kind = "markers" if frames is MARKERS else "weights"
+    files = recordings(frame_pattern("abcd"[: len(frames[0].values)], kind, "cm"))
+    source, poses = files.source(tmp_path / "in.h5"), files.poses(tmp_path / "out.csv")
+    for frame in frames:
+        source.add(frame)
+        poses.send(frame, pose(frame))
+    left, _ = files.going_on
+    with left.open("ab") as file:
+        file.write(b"a row cut")  # no session does, a power cut may
+    assert takes_in(tmp_path) == []
+    take, posed = (read_take_file(path) for path in files.going_on)
+    np.testing.assert_array_equal(take.source.values, [frame.values for frame in frames])
+    assert (take.units, posed.controls.names) == ("cm", CONTROLS.names)
+    np.testing.assert_array_equal(posed.controls.limits, CONTROLS.limits)
+    np.testing.assert_array_equal(posed.params, [frame.values.ravel()[:2] for frame in frames])
+    files.close()  # as a process that ends
+    assert recordings().source(tmp_path / "in.h5")
+    assert "the 8 frames that it recorded are in" in caplog.text
+    assert len(facert.read_take(tmp_path / "in-recovered.h5")) == 8
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{}\n",
+        b'{"format": "facert-recording"}\n' + bytes(80),
+        b'{"format": "facert-recording", "format_version": 1, "kind": "weights", "names": 5}\n',
+        b'{"format": "facert-recording", "format_version": 2}\n',
+        b'{"format": "facert-recording", "format_version": 1, "kind": "weights", "names": ["a"], '
+        b'"controls": null, "limits": null, "units": [], "start_timecode": ""}\n' + bytes(80),
+        b"[" * 100_000,
+    ],
+)
+def test_a_damaged_recording_is_an_error_about_it(tmp_path, content):
+    path = tmp_path / "in.h5.recording"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"in\.h5\.recording"):
+        read_take_file(path)
+
+
+def test_when_the_disk_is_full_the_frames_before_stay(recordings, tmp_path, caplog):
+    files = recordings()
+    record = files.source(tmp_path / "in.h5")
+    record.add(WEIGHTS[0])
+    size = record.recording.stat().st_size
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+    try:
+        for frame in WEIGHTS[1:]:
+            record.add(frame)
+        with pytest.raises(InputError, match=r"All frames are in .*in\.h5\.recording"):
+            files.write("")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "recorded no further than 4 frames: File too large" in caplog.text
+    files.close()
+    assert len(read_take_file(record.recording)) == 4

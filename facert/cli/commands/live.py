@@ -114,7 +114,9 @@ def command(
         receiver = _open_receiver(begin, listen, retargeter, speed, target)
         stack.callback(receiver.close)
         controls, pattern = retargeter.controls, receiver.pattern
-        recordings = Recordings(pattern, retargeter.source_names, controls, overwrite)
+        recordings = Recordings(
+            pattern, retargeter.source_names, controls, overwrite, lambda: receiver.start_timecode
+        )
         stack.callback(recordings.close)
         kept = recordings.source(record) if record else None
         files = [recordings.poses(end.path) for end in ends if isinstance(end, File)]
@@ -129,6 +131,7 @@ def command(
         stack.enter_context(_raised_priority())
         status = stack.enter_context(Status(session))
         _announce(begin, listen, receiver, ends)
+        _announce_recordings(recordings.going_on)
         if neutral is not None:
             _announce_rest(neutral, retargeter)
         try:
@@ -190,6 +193,15 @@ def _announce(
     for end in ends:
         if isinstance(end, Address):
             console.log.info("sends %s to %s", end.kind, end.place)
+
+
+def _announce_recordings(paths: Sequence[Path]) -> None:
+    if paths:
+        names = ", ".join(map(str, paths))
+        text = (
+            "until the end all frames are in %s; if facert is killed, convert makes takes of them"
+        )
+        console.log.info(text, names)
 
 
 def _announce_rest(seconds: float, retargeter: Retargeter) -> None:
