@@ -82,16 +82,20 @@ class FileMemory:
     """
 
     def __init__(self, path: Path | int) -> None:
-        size = path if isinstance(path, int) else path.stat().st_size
-        self.limit = _Limit(min(max(FACTOR * size, LEAST), MOST))
-        self.taken = 0
+        self._size = self.taken = 0
+        self.include(path)
+
+    def include(self, path: Path | int) -> None:
+        """Count another file as a part of this one, which may take more by that."""
+        self._size += path if isinstance(path, int) else path.stat().st_size
+        self._limit = _Limit(min(max(FACTOR * self._size, LEAST), MOST))
 
     def require(self, size: int, field: str) -> None:
         """Count `size` bytes more.
 
         Raises `InputError` that names the field when the file takes more than it may.
         """
-        self.limit.require(self.taken + size, field)
+        self._limit.require(self.taken + size, field)
         self.taken += size
 
 

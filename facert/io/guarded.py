@@ -9,12 +9,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from facert.errors import InputError
+from facert.data.memory import CELL, FileMemory
+from facert.errors import FacertError, InputError
 
 log = logging.getLogger("facert")
 
 MAX_BYTES = 2**29
 """Largest file that is read as a whole: half a gibibyte."""
+_COPIES = 3  # of a text are in memory: its bytes, its characters, its lines
+_SEPARATORS = (b",", b";", b":", b"\t", b"\n", b"[", b"{")
+"""Each is one value more, in tables and in JSON."""
+_ZEROS = 2**20
+"""Bytes of 0 that a text may have, as one that a power cut ended does; more are a hole."""
+_AT_ONCE = 2**22
 
 
 def existing_file(path: Path) -> Path:
@@ -58,10 +65,12 @@ def encoding_of(path: Path) -> str:
 def read_text(path: Path) -> str:
     """Read a text file of UTF-8, with or without a byte order mark, or of UTF-16 with its mark.
 
-    Raises `InputError` when the file is missing, too large or neither.
+    Raises `InputError` when the file is missing, too large or neither, or when its values would
+    take more memory than they may.
     """
     try:
-        return moderate_file(path).read_text(encoding=encoding_of(path))
+        _require_text(path)
+        return path.read_text(encoding=encoding_of(path))
     except (UnicodeError, OSError) as error:
         found, fix = "something else", "Save it as UTF-8."
         raise InputError("file", "UTF-8 text that can be read", found, fix) from error
@@ -70,9 +79,11 @@ def read_text(path: Path) -> str:
 def read_old_text(path: Path) -> str:
     """Read a text file whose writer may be older than UTF-8: UTF-16 with its mark, or Latin-1.
 
-    Raises `InputError` when the file is missing or too large, or UTF-16 without sense.
+    Raises `InputError` when the file is missing or too large, UTF-16 without sense, or when its
+    values would take more memory than they may.
     """
-    content = moderate_file(path).read_bytes()
+    _require_text(path)
+    content = path.read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         with parsing("file", "UTF-16 text", "Save it as UTF-8."):
             return content.decode("utf-16")
@@ -83,6 +94,26 @@ def read_old_text(path: Path) -> str:
         return content.decode("cp1252", errors="replace")
 
 
+def _require_text(path: Path) -> None:
+    """Check a text file for holes, and what its values will take, before it is in memory."""
+    memory = FileMemory(moderate_file(path))
+    memory.require(_COPIES * path.stat().st_size, "file")
+    values = zeros = 0
+    wide = encoding_of(path) == "utf-16"
+    with path.open("rb") as file:
+        while content := file.read(_AT_ONCE):
+            values += values_in(content)
+            zeros += 0 if wide else content.count(0)
+            if zeros > _ZEROS:
+                raise InputError("file", "text", "a hole of zeros", "Copy it again.")
+    memory.require(CELL * values, "file")
+
+
+def values_in(text: bytes) -> int:
+    """How many values a table or JSON holds at most, about, by what separates them."""
+    return sum(map(text.count, _SEPARATORS))
+
+
 @contextmanager
 def parsing(
     field: str, expected: str, fix: str = "Export it again.", found: str = "damaged data"
@@ -91,11 +122,15 @@ def parsing(
 
     Hostile bytes raise struct.error, KeyError, OverflowError and more, which nobody can list.
 
-    Raises `InputError` instead of any other exception.
+    Raises `InputError` instead of any other exception but facert's own, and those of the system
+    about a file.
     """
     try:
         yield
-    except InputError:
+    except FacertError:
         raise
     except Exception as error:
-        raise InputError(field, expected, f"{found} ({error})", fix) from error
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        said = str(error) or type(error).__name__
+        raise InputError(field, expected, f"{found} ({said})", fix) from error

@@ -67,7 +67,7 @@ def body_of(scene: Scene, face: FloatArray, nodes: Sequence[int] = ()) -> Placed
         log.info("without shapes, for pictures only: %s", listed(list(shown), _LISTED))
     if shown and clear:
         log.info("seen through, so not shown: %s", listed(list(clear), _LISTED))
-    return welded(united(parts)) if parts else None
+    return welded(united(parts, scene.document.memory)) if parts else None
 
 
 def _cut(part: PlacedMesh, face: FloatArray) -> PlacedMesh:

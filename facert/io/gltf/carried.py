@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from facert.data.text import printable
 from facert.data.version import CREATED_BY, MARK
@@ -18,6 +17,7 @@ from facert.errors import InputError
 from facert.io.gltf.buffer import Buffer, write_container
 from facert.io.gltf.compression import MESHOPT
 from facert.io.gltf.container import Container, is_left_out, read_container
+from facert.io.gltf.uris import file_of
 from facert.io.guarded import moderate_file, parsing
 
 log = logging.getLogger("facert")
@@ -45,7 +45,7 @@ class CarriedFile:
             views = self.root.setdefault("bufferViews", [])
             self.buffer = Buffer(views, self.root.setdefault("accessors", []))
             self._gather(container)
-            self._embed_pictures(container.folder)
+            self._embed_pictures(container)
 
     def write(self, path: Path, overwrite: bool) -> None:
         """Write it as GLB; see `write_container`."""
@@ -70,6 +70,7 @@ class CarriedFile:
                 continue
             if one["byteLength"] > len(content):
                 raise ValueError(f"a buffer of {one['byteLength']} bytes in {len(content)}")
+            container.memory.require(one["byteLength"], "buffers")
             places.append((0, self.buffer.append(content[: one["byteLength"]])))
         self.root["buffers"] = buffers
         for view in self.buffer.views:
@@ -79,7 +80,7 @@ class CarriedFile:
                 if begin:
                     place["byteOffset"] = begin + place.get("byteOffset", 0)
 
-    def _embed_pictures(self, folder: Path) -> None:
+    def _embed_pictures(self, container: Container) -> None:
         """Bring pictures beside the document into the buffer, each once; name all others."""
         outside: list[str] = []
         held: dict[Path, dict[str, Any]] = {}
@@ -87,8 +88,8 @@ class CarriedFile:
             uri = image.get("uri")
             if not isinstance(uri, str) or uri.startswith("data:"):
                 continue
-            path = _path_within(folder, uri)
-            found = None if path is None else held.get(path) or self._embedded(path)
+            path = _path_within(container.path, uri)
+            found = None if path is None else held.get(path) or self._embedded(path, container)
             if path is None or found is None:
                 outside.append(uri)
                 continue
@@ -99,8 +100,10 @@ class CarriedFile:
             names = printable(", ".join(outside), 200)
             log.warning("pictures that are not in the character's folder stay outside: %s", names)
 
-    def _embedded(self, path: Path) -> dict[str, Any] | None:
+    def _embedded(self, path: Path, container: Container) -> dict[str, Any] | None:
         """What an image says that has come into the buffer; None where it is no picture."""
+        container.memory.include(path)
+        container.memory.require(path.stat().st_size, "images")
         found = _picture(path)
         if found is None:
             return None
@@ -108,13 +111,13 @@ class CarriedFile:
         return {"mimeType": kind, "bufferView": self.buffer.view(content)}
 
 
-def _path_within(folder: Path, uri: str) -> Path | None:
-    """A file in the folder or below it; None for anything else."""
-    name = unquote(uri)
-    if "\\" in name or ":" in name or "\0" in name:
+def _path_within(document: Path, uri: str) -> Path | None:
+    """A file in the document's folder or below it; None for anything else."""
+    try:
+        path = file_of(uri, document, "images")
+    except InputError:
         return None
-    path = (folder / name).resolve()
-    return path if path.is_relative_to(folder.resolve()) and path.is_file() else None
+    return path if path.is_file() else None
 
 
 def _picture(path: Path) -> tuple[bytes, str] | None:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.memory import FLOAT, FileMemory
 from facert.data.version import MARK
 from facert.errors import InputError, reading
 from facert.io.gltf.compression import MESHOPT, decompressed
@@ -43,10 +44,13 @@ class Document:
     root : dict
         The JSON, as it stands in the file: keys and types are not checked.
     buffers : sequence of bytes
+    memory : FileMemory
     """
 
     root: dict[str, Any]
     buffers: Sequence[bytes]
+    memory: FileMemory = field(default_factory=lambda: FileMemory(0))
+    # All that is decoded is counted, however often.
     _unpacked: dict[int, bytes] = field(default_factory=dict)  # compressed views, by number
 
     def numbers(self, accessor: int) -> FloatArray:
@@ -66,12 +70,12 @@ class Document:
 
     def _values(self, accessor: dict[str, Any]) -> NDArray[Any]:
         width, count = _WIDTHS[accessor["type"]], _index(accessor["count"])
-        if count * width > MAX_VALUES:
-            raise InputError("accessors", f"at most {MAX_VALUES} numbers", f"{count}", "Cut it.")
+        self.memory.require(FLOAT * count * width, "accessors")
         dtype = _TYPES[accessor["componentType"]]
-        values = np.zeros((count, width), dtype)
         if "bufferView" in accessor:
             values = self._view(accessor, dtype, count, width)
+        else:
+            values = np.zeros((count, width), dtype)
         if "sparse" in accessor:
             sparse = accessor["sparse"]
             changed = _index(sparse["count"])
@@ -100,6 +104,7 @@ class Document:
             return self._bytes(view)
         if number not in self._unpacked:
             length = _index(view["byteLength"])
+            self.memory.require(length, "bufferViews")
             self._unpacked[number] = decompressed(packed, self._bytes(packed), length)
         return self._unpacked[number]
 
@@ -129,7 +134,7 @@ def _document(path: Path) -> Document:
     if _needs_draco(container.root):
         fix = "Export it without Compression, or: npx gltf-pipeline -i IN.glb -o PLAIN.glb"
         raise InputError("extensionsRequired", "no Draco compression", _DRACO, fix)
-    return Document(container.root, container.buffers())
+    return Document(container.root, container.buffers(), container.memory)
 
 
 def _needs_draco(root: dict[str, Any]) -> bool:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.errors import InputError
-from facert.io.gltf.document import MAX_VALUES, Document
+from facert.data.memory import FLOAT, FileMemory
+from facert.io.gltf.document import Document
 from facert.io.gltf.scene import Scene, displaced, mirrored, transformed
 
 _TRIANGLES = 4
@@ -57,7 +57,7 @@ def placed_mesh(
     """Triangles with the names of their targets, and how they follow some driven nodes."""
     document, attributes = scene.document, one.entry["attributes"]
     vertices = _vectors(document, attributes["POSITION"])
-    require_moderate(len(one.targets), len(vertices))
+    require_targets(document.memory, len(one.targets), len(vertices))
     moved = np.zeros((len(one.targets), *vertices.shape))
     for index, target in enumerate(one.targets):
         if "POSITION" in target:
@@ -82,6 +82,7 @@ def _shares(scene: Scene, one: Primitive, vertices: int, nodes: Sequence[int]) -
     """How far vertices follow each of some nodes, (V, N)."""
     found = scene.shares(one.node, one.entry["attributes"], nodes)
     if found is None:
+        scene.document.memory.require(FLOAT * vertices * len(nodes), "nodes")
         found = np.zeros((vertices, len(nodes)))
         place = scene.above(one.node, nodes)
         if place >= 0:
@@ -89,15 +90,16 @@ def _shares(scene: Scene, one: Primitive, vertices: int, nodes: Sequence[int]) -
     return found
 
 
-def united(parts: Sequence[PlacedMesh]) -> PlacedMesh:
+def united(parts: Sequence[PlacedMesh], memory: FileMemory) -> PlacedMesh:
     """Join parts into one mesh; a target that a part does not have leaves it at rest."""
     names = tuple(dict.fromkeys(name for part in parts for name in part.names))
+    row_of = {name: row for row, name in enumerate(names)}
     sizes = [len(part.vertices) for part in parts]
-    require_moderate(len(names), sum(sizes))
+    require_targets(memory, len(names), sum(sizes))
     starts = np.cumsum([0, *sizes[:-1]])
     targets = np.zeros((len(names), sum(sizes), 3))
     for part, start in zip(parts, starts, strict=True):
-        rows = [names.index(name) for name in part.names]
+        rows = [row_of[name] for name in part.names]
         targets[rows, start : start + len(part.vertices)] = part.targets
     return PlacedMesh(
         vertices=np.concatenate([part.vertices for part in parts]),
@@ -128,11 +130,9 @@ def welded(part: PlacedMesh) -> PlacedMesh:
     )
 
 
-def require_moderate(targets: int, vertices: int) -> None:
+def require_targets(memory: FileMemory, targets: int, vertices: int) -> None:
     """Raise InputError for more targets of vertices than memory should hold."""
-    if 3 * max(targets, 1) * vertices > MAX_VALUES:
-        found = f"{targets} targets of {vertices} vertices"
-        raise InputError("meshes", "a face of moderate size", found, "Export the face alone.")
+    memory.require(3 * FLOAT * max(targets, 1) * vertices, "meshes")
 
 
 def _vectors(document: Document, accessor: int) -> FloatArray:

@@ -28,7 +28,7 @@ from facert.io.gltf.parts import (
     Primitive,
     placed_mesh,
     primitives,
-    require_moderate,
+    require_targets,
     united,
     welded,
 )
@@ -71,15 +71,15 @@ def read_gltf_rig(path: Path, shapes: str | None = None, drivers: Drivers | None
         parts = [placed_mesh(scene, one, names[one.mesh], driven.nodes) for one in there]
         if shapes == EXPRESSIONS:
             pairs = zip(parts, there, strict=True)
-            parts = [_expressed(part, one.mesh, expressions) for part, one in pairs]
-        whole = welded(united(parts))
+            parts = [_expressed(document, part, one.mesh, expressions) for part, one in pairs]
+        whole = welded(united(parts, document.memory))
         _warn_of_size(whole.vertices)
+        require_targets(document.memory, len(driven.controls), len(whole.vertices))
         return _rig(whole, body_of(scene, whole.vertices, driven.nodes), driven)
 
 
 def _rig(whole: PlacedMesh, body: PlacedMesh | None, driven: Driven) -> Rig:
     idle = len(driven.controls) - len(whole.names)
-    require_moderate(len(driven.controls), len(whole.vertices))
     parts = [whole] if body is None else [whole, body]
     motion = driven.motion
     if motion is not None:
@@ -109,7 +109,7 @@ def read_gltf_mesh(path: Path) -> Mesh:
             raise InputError("meshes", "triangles", "none", "Export the mesh as well.")
         names = target_names(document)
         parts = [placed_mesh(scene, one, names.get(one.mesh, ())) for one in chosen]
-        whole = welded(united(parts))
+        whole = welded(united(parts, document.memory))
         return Mesh(whole.vertices, whole.faces, UNITS, whole.colours)
 
 
@@ -157,9 +157,11 @@ def expressions_by_name(document: Document, shapes: str | None) -> dict[str, lis
     return found
 
 
-def _expressed(part: PlacedMesh, mesh: int, expressions: dict[str, list[Bind]]) -> PlacedMesh:
+def _expressed(
+    document: Document, part: PlacedMesh, mesh: int, expressions: dict[str, list[Bind]]
+) -> PlacedMesh:
     """The part with expressions for targets: sums of those that they set."""
-    require_moderate(len(expressions), len(part.vertices))
+    require_targets(document.memory, len(expressions), len(part.vertices))
     weights = target_weights(expressions, mesh, len(part.targets))
     return replace(
         part, targets=np.tensordot(weights, part.targets, axes=1), names=tuple(expressions)

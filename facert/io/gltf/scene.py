@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.io.gltf.document import MAX_VALUES, Document
+from facert.data.memory import FLOAT
+from facert.io.gltf.document import Document
 
 MAX_SETS = 8
 """Most sets of four joints a vertex."""
@@ -71,6 +72,7 @@ class Scene:
             return None
         joint, share = self._ties(attributes)
         followed = [self.above(one, driven) for one in self.document.root["skins"][skin]["joints"]]
+        self.document.memory.require(FLOAT * len(joint) * len(driven), "skins")
         found = np.zeros((len(joint), len(driven)))
         for number in range(len(driven)):
             found[:, number] = (share * (np.array(followed)[joint] == number)).sum(axis=1)
@@ -104,8 +106,7 @@ class Scene:
             joints.append(self.document.integers(attributes[f"JOINTS_{number}"]))
             weights.append(self.document.numbers(attributes[f"WEIGHTS_{number}"]))
         joint, weight = np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
-        if 16 * len(joint) > MAX_VALUES:
-            raise ValueError(f"{len(joint)} vertices that follow joints")
+        self.document.memory.require(16 * FLOAT * len(joint), "skins")  # a matrix each
         if not np.isfinite(weight).all():
             raise ValueError("NaN or infinity for the weight of a joint")
         weight = np.maximum(weight, 0.0)  # below 0 by rounding

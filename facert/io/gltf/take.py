@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import FLOAT
 from facert.data.rate import AGREES, nominal_rate
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.io.gltf.document import MAX_VALUES, Document, open_gltf
+from facert.io.gltf.document import Document, open_gltf
 from facert.io.gltf.names import target_names
 from facert.io.gltf.vrm import animated_expressions
 from facert.io.registry import Kind
@@ -24,6 +26,7 @@ _WEIGHTS = "weights"
 _FASTEST = 240.0  # frames a second
 _CLOSE = 0.05  # the share of the steps between keys that are as close as frames, at least
 _SAME = 1e-6  # seconds: keys are stored as float32
+_TERMS = 6  # of the sum that a key is sampled by, in memory at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +50,18 @@ def read_gltf_take(path: Path, target: str | None = None) -> Take:
     """
     with open_gltf(path) as document:
         curves = _chosen(document, target)
-        time, rate = _frame_times([one.time for one in curves])
         names = tuple(dict.fromkeys(name for one in curves for name in one.names))
-        if len(time) * len(names) > MAX_VALUES:
-            raise ValueError("more frames than can be kept")
+        column = {name: place for place, name in enumerate(names)}
+        widest = max(len(one.names) for one in curves)
+        most = FLOAT * (len(names) + _TERMS * widest + _TERMS)
+
+        def require(frames: int) -> None:
+            document.memory.require(most * frames, "animations")
+
+        time, rate = _frame_times([one.time for one in curves], require)
         values = np.full((len(time), len(names)), np.nan)
         for one in reversed(curves):  # where two meshes have a name, the first one's counts
-            values[:, [names.index(name) for name in one.names]] = _sampled(one, time)
+            values[:, [column[name] for name in one.names]] = _sampled(one, time)
         return Take(time=time, source=Source(values, names), fps=rate)
 
 
@@ -61,26 +69,30 @@ def kind_of(path: Path, asked: Kind | None = None) -> Kind:
     """Kind to read: the one asked for, else the rig, with a line in the log on its animation."""
     if asked is None:
         with open_gltf(path) as document:
-            animated = any(_channels(document, one) for one in document.root.get("animations", []))
+            nodes = animated_expressions(document.root)
+            animated = any(_channels(nodes, one) for one in document.root.get("animations", []))
         if animated:
             log.info("%s: this is the rig; its animation is a take as well", path.name)
     return asked or "rig"
 
 
-def _channels(document: Document, animation: dict[str, Any]) -> list[dict[str, Any]]:
-    """The channels of morph targets' weights, and of the nodes that stand for expressions."""
-    nodes = animated_expressions(document.root)
-    return [
-        one
-        for one in animation["channels"]
-        if one["target"]["path"] == _WEIGHTS
-        or (one["target"]["path"] == "translation" and one["target"].get("node") in nodes)
-    ]
+def _channels(expressions: Mapping[int, str], animation: dict[str, Any]) -> list[dict[str, Any]]:
+    """The channels of morph targets' weights, and of the nodes that stand for expressions.
+
+    Of several that move the same the first, as the others are not allowed.
+    """
+    found: dict[tuple[Any, str], dict[str, Any]] = {}
+    for one in animation["channels"]:
+        node, path = one["target"].get("node"), one["target"]["path"]
+        if path == _WEIGHTS or (path == "translation" and node in expressions):
+            found.setdefault((node, path), one)
+    return list(found.values())
 
 
 def _chosen(document: Document, asked: str | None) -> list[_Curves]:
     """The curves of the animation that was asked for, or of the only one."""
-    found = [one for one in document.root.get("animations", []) if _channels(document, one)]
+    nodes = animated_expressions(document.root)
+    found = [one for one in document.root.get("animations", []) if _channels(nodes, one)]
     names = [str(one.get("name", f"animation {i}")) for i, one in enumerate(found, start=1)]
     there = f"one of: {', '.join(names)}" if names else "an animation of morph targets"
     if asked is not None and asked not in names:
@@ -90,7 +102,7 @@ def _chosen(document: Document, asked: str | None) -> list[_Curves]:
         raise InputError("animations", there, "none" if not found else "no choice", wanted)
     animation = found[names.index(asked)] if asked is not None else found[0]
     known = _names_by_node(document)
-    channels = _channels(document, animation)
+    channels = _channels(nodes, animation)
     return [_curves(document, animation, channel, known) for channel in channels]
 
 
@@ -122,8 +134,13 @@ def _curves(
     return _Curves(time, values.reshape(shape), names, interpolation)
 
 
-def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:
-    """Times of the frames, and their rate: at every key, and evenly between keys far apart."""
+def _frame_times(
+    keys: list[FloatArray], require: Callable[[int], None]
+) -> tuple[FloatArray, float]:
+    """Times of the frames, and their rate: at every key, and evenly between keys far apart.
+
+    `require` refuses too many.
+    """
     time = np.unique(np.concatenate(keys))
     if len(time) < 2:
         return time, nominal_rate(time)
@@ -131,8 +148,7 @@ def _frame_times(keys: list[FloatArray]) -> tuple[FloatArray, float]:
     usual = float(np.quantile(steps, _CLOSE, method="lower"))
     rate = min(nominal_rate(np.array([0.0, usual])), _FASTEST)
     frames = np.maximum(np.rint(steps * rate), 1)  # in each step
-    if frames.sum() > MAX_VALUES:
-        raise ValueError("keys that lie years apart")
+    require(int(frames.sum()))
     step = np.repeat(np.arange(len(steps)), frames.astype(np.int64))
     number = np.arange(len(step)) - np.repeat(np.cumsum(frames) - frames, frames.astype(np.int64))
     found = np.append(time[step] + steps[step] * number / frames[step], time[-1])

@@ -14,8 +14,8 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
-from facert.io.gltf.container import data_of
 from facert.io.gltf.document import Document
+from facert.io.gltf.uris import data_of
 from facert.io.guarded import parsing
 
 KINDS = ("PNG", "JPEG", "WEBP")
