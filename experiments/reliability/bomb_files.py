@@ -17,8 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from facert.data.take import Controls, Source, Take
+from facert.io.formats import write_take_file
+
 READ = ("inspect FILE", "convert FILE DIR/out.h5")
-RIG = (*READ, "render FILE DIR/out.png --rig FILE")
+RIG = (*READ, "render DIR/take.h5 DIR/out.png --rig FILE")
 TAKE = (*READ, "clean FILE DIR/out.h5", "suggest FILE -n 3")
 
 
@@ -33,12 +36,24 @@ class Bomb:
 BOMBS: dict[str, Bomb] = {}
 
 
+def write_take(folder: Path) -> None:
+    """A take of 20 poses of a jaw, for a rig to show."""
+    params = np.linspace(0, 1, 20)[:, None]
+    source, controls = Source(params, ("jaw",)), Controls(("jawOpen",))
+    write_take_file(
+        Take(np.arange(20) / 25, source, controls=controls, params=params, fps=25.0),
+        folder / "take.h5",
+    )
+
+
 def bomb(name: str, ending: str, commands: Sequence[str] = READ) -> Callable[[Any], Any]:
     """Register a function that makes the content of a file: bytes, text, or JSON."""
 
     def register(content: Callable[[], Any]) -> Callable[[], Any]:
         def make(folder: Path) -> Path:
             path, made = folder / f"bomb{ending}", content()
+            if any("take.h5" in command for command in commands):
+                write_take(folder)
             if not isinstance(made, bytes | str):
                 made = json.dumps(made)
             path.write_bytes(made.encode() if isinstance(made, str) else made)
@@ -299,7 +314,7 @@ def rig(**changed: Any) -> bytes:
         "neutral": vertices,
         "faces": np.arange(30).reshape(10, 3),
         "deltas": np.random.default_rng(1).normal(size=(3, 30, 3)) * 0.01,
-        "names": np.array(["a", "b", "c"]),
+        "names": np.array(["jawOpen", "b", "c"]),
     }
     return archive(**(plain | changed))
 

@@ -1,4 +1,4 @@
-"""Hostile files of meshes, scenes, captures and settings; see `experiments.reliability.bomb_files`."""
+"""Hostile files of meshes, scenes, captures and settings; see `bomb_files`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.reliability.bomb_files import BOMBS, RIG, TAKE, Bomb, each, honest, markers
 
-GLTF = ("inspect FILE", "convert FILE DIR/out.h5", "render FILE DIR/out.png --rig FILE")
+GLTF = (*RIG, "convert FILE DIR/out.csv")
 MESH = ("drive DIR/points.csv DIR/out.h5 --mesh FILE",)
 
 
@@ -323,7 +323,8 @@ def live_link(code: str = "{0:02}:00:{1:02}:{2:02}.{2:03}", value: object = 0.5)
 each("live link", ".csv", {
     "garbage": live_link("{0}{1}{2}"), "hours of 10^20": live_link("9" * 20 + ":00:{1:02}:{2:02}"),
     "frames of 10^20": live_link("01:00:{1:02}:" + "9" * 20), "nan": live_link("nan:nan:nan:nan"),
-    "negative": live_link("-1:-1:-1:-1"), "subframes 10^300": live_link("01:00:{1:02}:{2:02}." + "9" * 300),
+    "negative": live_link("-1:-1:-1:-1"),
+    "subframes 10^300": live_link("01:00:{1:02}:{2:02}." + "9" * 300),
     "value 1e300": live_link(value="1e300"),
 }, ("inspect FILE", "convert FILE DIR/out.h5", "suggest FILE -n 3"))  # fmt: skip
 

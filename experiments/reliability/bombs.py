@@ -24,7 +24,7 @@ from experiments.reliability import bomb_scenes  # noqa: F401  it registers its 
 from experiments.reliability.bomb_files import BOMBS
 
 LIMIT = 6 << 30  # bytes of address space
-PATIENCE = 40  # CPU seconds after which a process is killed
+PATIENCE = 15  # CPU seconds after which a process is killed
 
 
 @dataclass(frozen=True)

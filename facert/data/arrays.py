@@ -16,6 +16,15 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
+MAX_NAMES = 2**14
+"""Most markers, weights or controls: no recording of a face has so many."""
+LATEST = 1e12
+"""Seconds from 0 to a frame, at most; a clock of whole nanoseconds is no clock of seconds."""
+RATES = (1e-9, 1e9)
+"""Frames a second, between which a rate lies."""
+LARGEST = 1e15
+"""No coordinate of a mesh is larger, in whatever unit: products of four are numbers still."""
+
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 # HDF5 cannot hold NUL, UTF-8 no half of a pair; control characters and line ends upset a terminal.
@@ -69,8 +78,24 @@ def require_time(time: FloatArray, frames: int, fps: float) -> None:
     if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         expected, found = "finite, strictly rising seconds", "a step back, a repeat or NaN"
         raise InputError("/time", expected, found, "Sort the frames by time and drop repeats.")
+    if np.abs(time).max(initial=0.0) > LATEST:
+        found = f"up to {np.abs(time).max():.1e}"
+        fix = "Check the clock, and its unit."
+        raise InputError("/time", f"seconds up to {LATEST:g}", found, fix)
     if not (np.isfinite(fps) and fps > 0):
         raise InputError("fps", "a positive number", f"{fps}", "Set the frame rate.")
+    if not RATES[0] <= fps <= RATES[1]:
+        expected = f"a rate between {RATES[0]:g} and {RATES[1]:g}"
+        raise InputError("fps", expected, f"{fps:g}", "Set the frame rate.")
+
+
+def require_sensible(array: FloatArray, path: str) -> None:
+    """Refuse numbers that are not finite, or so large that their squares might not be."""
+    require_finite(array, path)
+    most = max(array.max(initial=0.0), -array.min(initial=0.0))
+    if most > LARGEST:
+        found = f"up to {most:.1e}"
+        raise InputError(path, "numbers of a sensible size", found, "Check the units.")
 
 
 def checked_colours(value: ArrayLike | None, vertices: int) -> FloatArray | None:
@@ -87,6 +112,9 @@ def checked_colours(value: ArrayLike | None, vertices: int) -> FloatArray | None
 
 def checked_names(names: Sequence[str], count: int, path: str) -> tuple[str, ...]:
     """Check that there is one name a column, each plain text, none empty and none twice."""
+    if len(names) > MAX_NAMES:
+        found, fix = f"{len(names)}", "Leave out what is not of the face."
+        raise InputError(path, f"at most {MAX_NAMES} names", found, fix)
     names = tuple(str(name) for name in names)
     if len(names) != count or not names:
         raise InputError(path, f"{count} names", f"{len(names)}", "Give one name a column.")

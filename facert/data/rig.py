@@ -19,8 +19,8 @@ from facert.data.arrays import (
     checked_names,
     float_array,
     frozen,
-    require_finite,
     require_plain,
+    require_sensible,
     require_shape,
     require_time,
     set_fields,
@@ -61,7 +61,7 @@ class Mesh:
     def __post_init__(self) -> None:
         vertices = float_array(self.vertices, "/neutral")
         require_shape(vertices.shape, ("V", 3), "/neutral", "Give vertex positions.")
-        require_finite(vertices, "/neutral")
+        require_sensible(vertices, "/neutral")
         require_plain(self.units, "attribute units")
         faces = np.asarray(self.faces)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
@@ -74,6 +74,13 @@ class Mesh:
         colours = checked_colours(self.colours, len(vertices))
         set_fields(self, vertices=frozen(vertices), faces=frozen(faces.astype(np.int64)))
         set_fields(self, colours=colours)
+
+
+def require_extent(vertices: FloatArray) -> None:
+    """Refuse a mesh (V, 3) whose vertices all lie in one place: nobody can draw or drive it."""
+    if not np.ptp(vertices, axis=0).any():
+        fix = "Export the mesh in its rest pose."
+        raise InputError("/neutral", "vertices apart from each other", "all in one place", fix)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +171,7 @@ class Rig:
         shapes = float_array(self.shapes, "/shapes")
         fix = "Give one displacement a control and vertex."
         require_shape(shapes.shape, ("P", *mesh.vertices.shape), "/shapes", fix)
-        require_finite(shapes, "/shapes")
+        require_sensible(shapes, "/shapes")
         names = checked_names(self.names, len(shapes), "/names")
         set_fields(self, neutral=mesh.vertices, faces=mesh.faces, colours=mesh.colours)
         set_fields(self, shapes=frozen(shapes), names=names)

@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"[-+]?\d+")
 # In the outline of a name: A is a capital, a another cased letter, c one without case, m a mark on
 # the letter before it, 0 a digit.
 _WORD = re.compile(r"(?:Am*)+(?![am])|(?:Am*)?(?:am*)+|[-+]?0+|(?:cm*)+")
-_KEPT = 2**13  # Names whose words are remembered
+_KEPT = 2**16  # Names whose words are remembered: all columns of a large table
 
 # The first word of a name that begins like one of these decides the part of the face.
 _STEMS = {

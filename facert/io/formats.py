@@ -11,7 +11,7 @@ from typing import Any, Literal
 from facert.data.drivers import Drivers
 from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
-from facert.data.rig import Mesh, Rig
+from facert.data.rig import Mesh, Rig, require_extent
 from facert.data.take import Take
 from facert.data.text import plural
 from facert.errors import InputError, reading
@@ -22,6 +22,7 @@ from facert.io.registry import (
     Format,
     format_of,
     function,
+    read,
     require_output,
     unknown_input,
     write,
@@ -81,22 +82,25 @@ def read_any(
         raise unknown_input(path)
     if path.is_file() and not path.name.lower().endswith(found.endings):
         log.warning("%s: read as %s, which it is by its content", path.name, found.endings[0])
-    held = function(found.kind_of)(path, kind) if found.kind_of else next(iter(found.read))
-    reader = function(found.read[held])
+    held = read(found.kind_of, path, kind) if found.kind_of else next(iter(found.read))
+    reader = found.read[held]
     if held == "take" and target:
         _require_targets(found, path)
     fps = None if fps is None else standard_rate(fps)
     options: dict[str, Any] = {"target": target, "shapes": shapes, "fps": fps or or_fps}
     options |= {"keep": keep, "align": align, "sparse": sparse, "drivers": drivers}
-    taken = signature(reader).parameters.keys() & options.keys()
+    taken = signature(function(reader)).parameters.keys() & options.keys()
     if align and "align" not in taken:
         fix = "Leave it out: the shapes are displacements."
         raise InputError("--align-shapes", "a folder of OBJ files", held, fix, where=str(path))
     if drivers is not None and "drivers" not in taken:
         fix = "Leave it out: only these files have bones."
         raise InputError("--drivers", "a .glb, .gltf or .vrm", path.name, fix, where=str(path))
-    read: Take | Rig = reader(path, **{name: options[name] for name in taken})
-    return read if fps is None else _at_rate(read, fps, "fps" in taken, path)
+    content: Take | Rig = read(reader, path, **{name: options[name] for name in taken})
+    if isinstance(content, Rig):
+        with reading(path):
+            require_extent(content.neutral)
+    return content if fps is None else _at_rate(content, fps, "fps" in taken, path)
 
 
 def _at_rate(found: Take | Rig, fps: float, asked: bool, path: Path) -> Take | Rig:
@@ -148,7 +152,7 @@ def targets_of(path: Path) -> dict[str, tuple[str, ...]]:
     found = format_of(Path(path), "read", "take")
     if found is None or not found.targets:
         return {}
-    targets: dict[str, tuple[str, ...]] = function(found.targets)(Path(path))
+    targets: dict[str, tuple[str, ...]] = read(found.targets, Path(path))
     return targets if len(targets) > 1 else {}
 
 
@@ -157,7 +161,7 @@ def nodes_of(path: Path) -> tuple[str, ...]:
     found = format_of(Path(path), "read", "rig")
     if found is None or not found.nodes:
         return ()
-    nodes: tuple[str, ...] = function(found.nodes)(Path(path))
+    nodes: tuple[str, ...] = read(found.nodes, Path(path))
     return nodes
 
 
@@ -210,7 +214,9 @@ def read_mesh(path: Path, shapes: str | None = None) -> Mesh:
     found = format_of(Path(path), "read", "mesh")
     if found is None:
         return read_rig_file(path, shapes).mesh
-    mesh: Mesh = function(found.read["mesh"])(Path(path))
+    mesh: Mesh = read(found.read["mesh"], Path(path))
+    with reading(path):
+        require_extent(mesh.vertices)
     return mesh
 
 

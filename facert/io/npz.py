@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray, require_shape
 from facert.data.columns import learnable
+from facert.data.memory import CELL, FLOAT, FileMemory
 from facert.data.rate import nominal_rate, standard_rate
 from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
@@ -37,9 +38,6 @@ from facert.io.tables.clock_column import in_seconds
 NO_TARGET = ""
 """Asks for the source alone of a file with several targets."""
 
-MAX_BYTES = 2**30
-"""Largest array that is unpacked: one gibibyte."""
-
 _SOURCES = {"markers": "marker_names", "positions": "names", "weights": "weight_names"}
 _PLAIN = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 
@@ -47,15 +45,19 @@ _PLAIN = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 class Archive:
     """Reading access to the arrays of one open .npz file."""
 
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-        self.keys = tuple(
-            name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")
-        )
+    def __init__(self, archive: zipfile.ZipFile, memory: FileMemory) -> None:
+        self._archive, self._memory = archive, memory
+        members = (name for name in archive.namelist() if name.endswith(".npy"))
+        self._keys = dict.fromkeys(name.removesuffix(".npy") for name in members)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The names of all arrays."""
+        return tuple(self._keys)
 
     def __contains__(self, key: str) -> bool:
         """Whether there is an array of that name."""
-        return key in self.keys
+        return key in self._keys
 
     def numbers(self, key: str) -> FloatArray:
         """Read an array of integers or floats as float64."""
@@ -82,11 +84,13 @@ class Archive:
         if key not in self:
             raise InputError(key, "an array", "nothing", f"Store {key}; see the layout.")
         member = self._archive.getinfo(f"{key}.npy")
-        if member.file_size > MAX_BYTES or member.compress_type not in _PLAIN:
-            found = f"{member.file_size} bytes, compression {member.compress_type}"
-            raise InputError(key, f"at most {MAX_BYTES} bytes, deflated", found, "Store it anew.")
+        if member.compress_type not in _PLAIN:
+            found = f"compression {member.compress_type}"
+            raise InputError(key, "a deflated array", found, "Store it anew.")
         with _parsing(key), self._archive.open(member) as stream:
-            dtype = _declared_type(stream, member.file_size)
+            dtype, count = _declared(stream, member.file_size)
+        cell = CELL if dtype.kind == "U" else FLOAT
+        self._memory.require(member.file_size + cell * count, key)
         if dtype.kind not in kinds:
             raise InputError(key, expected, f"{dtype}", "Store plain numbers or strings.")
         with _parsing(key), self._archive.open(member) as stream:
@@ -110,7 +114,7 @@ def open_archive(path: Path) -> Iterator[Archive]:
         with parsing("file", "an .npz archive", "Store it anew.", "something else"):
             file = zipfile.ZipFile(path)
         with file:
-            yield Archive(file)
+            yield Archive(file, FileMemory(path))
 
 
 def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:
@@ -174,8 +178,8 @@ def read_npz_rig(path: Path, shapes: str | None = None) -> Rig:
         )
 
 
-def _declared_type(stream: IO[bytes], held: int) -> np.dtype[Any]:
-    """Type of an array, after a look at whether the archive holds as much as it declares."""
+def _declared(stream: IO[bytes], held: int) -> tuple[np.dtype[Any], int]:
+    """Type and size of an array, after a look at whether the archive holds as much."""
     version = npy_format.read_magic(stream)
     read_header = {
         (1, 0): npy_format.read_array_header_1_0,
@@ -184,9 +188,10 @@ def _declared_type(stream: IO[bytes], held: int) -> np.dtype[Any]:
     if read_header is None:
         raise ValueError("unknown version")
     shape, _, dtype = read_header(stream)
-    if math.prod(shape) * max(dtype.itemsize, 1) > held:
+    count = math.prod(shape)
+    if count < 0 or count * max(dtype.itemsize, 1) > held:
         raise ValueError("declares more than there is")
-    return dtype
+    return dtype, count
 
 
 def _read_source(archive: Archive) -> Source:

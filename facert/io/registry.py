@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from facert.errors import InputError, OutputExistsError, OutputKeptError
+from facert.errors import InputError, OutputExistsError, OutputKeptError, reading
 from facert.io.claims import claim
 from facert.io.content import endings_by_content
 from facert.io.guarded import parsing
@@ -333,6 +333,15 @@ def write(kind: Kind, thing: object, path: Path, overwrite: bool = False) -> Non
     cannot hold, and `OutputExistsError` when `path` exists and `overwrite` is not set.
     """
     function(require_output(path, overwrite, kind).write[kind])(thing, path, overwrite)
+
+
+def read(name: str, path: Path, *arguments: object, **options: object) -> Any:
+    """What one of a format's functions makes of a file.
+
+    Raises `InputError` that names the file for whatever goes wrong in it, and is not of the system.
+    """
+    with reading(path), parsing("file", "content that makes sense"):
+        return function(name)(path, *arguments, **options)
 
 
 def unknown_input(path: Path) -> InputError:

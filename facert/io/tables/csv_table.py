@@ -45,7 +45,7 @@ from facert.io.tables.coordinates import markers_among
 from facert.io.tables.curve_table import is_curve_table, read_csv_curves
 from facert.io.tables.livelink import is_livelink, read_livelink
 from facert.io.tables.marker_header import marker_header
-from facert.io.tables.table import Table, is_number, is_text, table_of_lines
+from facert.io.tables.table import Table, is_number, is_text, require_few, table_of_lines
 from facert.io.tables.table_take import Reading, take_of_table, unlogged
 
 CURVE = "iteration,objective,gradient_norm,seconds"
@@ -70,6 +70,7 @@ def read_csv_take(
             return learnable(read_livelink(path, fps), keep, sparse)
         if header and is_curve_table(header):
             return read_csv_curves(read_text(path))
+        require_few(header)
         return read_table(path, fps, keep, sparse)
 
 

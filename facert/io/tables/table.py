@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import MAX_NAMES, FloatArray, IntArray
 from facert.errors import InputError
 from facert.io.lines import Line, check_width, to_numbers
 
@@ -19,6 +19,10 @@ _TRUTHS = {
 }
 # No number, whatever the language: it has a letter, or the parts of a time of day or a date.
 _TEXT = re.compile(r".*([^\W\d_]|:|\d;\d).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
+
+
+MAX_COLUMNS = 3 * MAX_NAMES + 64
+"""Those of markers, and of clocks, counters and flags beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,9 @@ class Table:
     """The T cells of each column of text."""
     place: Callable[[int], str]
     """A row's place in the file, for messages."""
+
+    def __post_init__(self) -> None:
+        require_few(self.names)
 
     def __len__(self) -> int:
         """Number of rows T."""
@@ -50,6 +57,16 @@ class Table:
         return InputError(where, expected, found, "Mend or remove it.")
 
 
+def require_few(columns: Sequence[str]) -> None:
+    """Refuse more columns than the most markers have.
+
+    Raises `InputError` that names the header.
+    """
+    if len(columns) > MAX_COLUMNS:
+        found, fix = f"{len(columns)}", "Leave out what is not of the face."
+        raise InputError("header", f"at most {MAX_COLUMNS} columns", found, fix)
+
+
 def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:
     """The table of the lines of a text file.
 
@@ -59,6 +76,7 @@ def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:
     Raises `InputError` naming the line and the column of the first cell that is no number among
     numbers.
     """
+    require_few(header)
     check_width(rows, header)
     columns = range(len(header))
     texts: dict[int, Sequence[str]] = {}
