@@ -6,7 +6,8 @@ import logging
 import os
 import signal
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import ModuleType
 from typing import Annotated, Any
 
@@ -42,9 +43,11 @@ from facert.cli.shared.help import Command, Group
 from facert.cli.shared.options import option
 from facert.cli.shared.signals import signals
 from facert.data import memory
+from facert.data.text import printable_lines
 from facert.data.version import CREATED_BY
 from facert.io.claims import claims_kept
 
+_Usage: Any = typer.BadParameter.__base__
 UNREAD = 128 + 13  # what shells show of a program that SIGPIPE ended: nobody reads its output
 ANYWHERE = ("-q", "--quiet", "-v", "--verbose", memory.OPTION)
 """Options of the whole command that may stand after its name as well as before it."""
@@ -57,16 +60,17 @@ class _Commands(Group):
         """Let the options of the whole command stand after its name as well as before it."""
         own = args[: args.index("--")] if "--" in args else args
         moved, rest = _split(own)
-        return super().parse_args(ctx, [*moved, *rest, *args[len(own) :]])
+        with _escaping():
+            return super().parse_args(ctx, [*moved, *rest, *args[len(own) :]])
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for, until it is done or a signal ends it."""
         try:
-            with signals.raising(), claims_kept():
+            with signals.raising(), claims_kept(), _escaping():
                 result = super().invoke(ctx)
         except KeyboardInterrupt as stop:
             notes = getattr(stop, "__notes__", [])
-            console.err.print(": ".join(["stopped", *notes]), style="yellow", markup=False)
+            console.err.print(": ".join(["stopped", *notes]), style="yellow")
             raise typer.Exit(signals.status) from None
         except BrokenPipeError:
             _drop_output()
@@ -74,6 +78,16 @@ class _Commands(Group):
         if signals.number not in (None, signal.SIGINT):  # Ctrl-C is how live and view end
             raise typer.Exit(signals.status)
         return result
+
+
+@contextmanager
+def _escaping() -> Iterator[None]:
+    """Escape what Typer says of the arguments: names of files are among them."""
+    try:
+        yield
+    except _Usage as error:
+        error.message = printable_lines(error.message)
+        raise
 
 
 def _split(args: list[str]) -> tuple[list[str], list[str]]:
@@ -160,12 +174,13 @@ for panel, modules in PANELS.items():
 
 def run() -> None:
     """Run the command line, and exit with what became of it."""
+    console.show_any_letter()
     try:
         app()
     except Exception as error:
         if is_unexpected(error) and console.log.isEnabledFor(logging.DEBUG):
-            console.err.print(trace(error), markup=False)
-        console.err.print(f"error: {described(error)}", style="red", markup=False)
+            console.err.print(trace(error))
+        console.err.print(f"error: {described(error)}", style="red")
         if isinstance(error, OSError):
             _drop_output()
         sys.exit(exit_status(error))

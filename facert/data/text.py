@@ -11,8 +11,9 @@ from __future__ import annotations
 import difflib
 import html
 import json
+import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from facert.errors import escaped
 
@@ -70,12 +71,20 @@ def for_mathtext(text: str) -> str:
 def for_json(value: object) -> str:
     """JSON in lines for people to read; what would upset a terminal is escaped as JSON does it.
 
-    Raises ValueError for NaN and infinity, which JSON does not have.
+    NaN and infinity, which JSON does not have, are null.
     """
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(_finite(value), indent=2, ensure_ascii=False, allow_nan=False)
     return _UNPRINTABLE.sub(
         lambda found: found[0] if found[0].isprintable() else json.dumps(found[0])[1:-1], text
     )
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def for_csv(text: str) -> str:

@@ -286,7 +286,6 @@ def _list(take: Take) -> None:
     """Print the corrections, a row each."""
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
     from facert.data.corrections import taken_out
     from facert.data.timecode import timecode
@@ -303,5 +302,5 @@ def _list(take: Take) -> None:
         seconds = float(take.time[frame])
         code = timecode(take.start_timecode, seconds, take.fps)
         row = (f"{frame}", f"{seconds:.3f}", code, f"{width:g}")
-        table.add_row(*row, Text(_moves(bare, take, int(frame))))
+        table.add_row(*row, console.cell(_moves(bare, take, int(frame))))
     console.out.print(table)

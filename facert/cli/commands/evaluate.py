@@ -246,7 +246,6 @@ def _table(rows: Sequence[EvaluationRow], title: str) -> Table:
     from rich import box
     from rich.measure import Measurement
     from rich.table import Table
-    from rich.text import Text
 
     from facert.evaluation.table import Column, columns_of, failures_of, sections_of
 
@@ -254,9 +253,9 @@ def _table(rows: Sequence[EvaluationRow], title: str) -> Table:
     if len({row.unlabelled for row in rows}) > 1:
         columns.insert(1, Column("unlabelled", "unlabelled"))
     table = Table(
-        title=Text(title),
+        title=console.cell(title),
         title_justify="left",
-        caption=Text("\n".join(failures_of(rows))),
+        caption="\n".join(failures_of(rows)),
         caption_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,

@@ -54,7 +54,7 @@ def command(
         drivers = read_drivers(drivers_path).tables
     text = script(program, addon, drivers)
     if output is None:
-        typer.echo(text, nl=False)
+        console.write(text)
         return
     save_text(text, output, overwrite)
     console.show(f"wrote {output}")

@@ -6,11 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from facert.cli.shared import console
 from facert.cli.shared.options import AS_JSON, SHAPES, TARGET, argument
-from facert.data.text import plural
+from facert.data.text import for_json, plural
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,11 +27,9 @@ def command(
     facert inspect facert-demo/training.h5
     facert inspect model.safetensors --json
     """
-    import json
-
     facts = _facts(path, target, shapes)
     if as_json:
-        typer.echo(json.dumps({"file": str(path), **facts}, indent=2, ensure_ascii=False))
+        console.write(for_json({"file": str(path), **facts}) + "\n")
     else:
         shown = _model_facts(facts) if facts["kind"] == "model" else _take_facts(facts)
         console.out.print(_table(path.name, shown), soft_wrap=False)
@@ -86,14 +82,14 @@ def _take_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
 def _table(title: str, facts: Mapping[str, Any]) -> Table:
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
-    # Text, not str: a name in brackets is no markup.
-    table = Table(title=Text(title), title_justify="left", box=box.SIMPLE, show_header=False)
+    table = Table(
+        title=console.cell(title), title_justify="left", box=box.SIMPLE, show_header=False
+    )
     table.add_column(style="bold", max_width=44)
     table.add_column(overflow="fold")
     for label, text in _lines(facts):
-        table.add_row(label, Text(text))
+        table.add_row(label, console.cell(text))
     return table
 
 

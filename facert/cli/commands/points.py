@@ -59,7 +59,7 @@ def suggest(
         save_picture(draw_points(rig.mesh, chosen), picture, overwrite)
         console.log.info("%s: %s on the face", picture, plural(len(chosen), "point"))
     console.out.print(_table(rig.mesh, chosen))
-    console.out.print(",".join(map(str, chosen)), markup=False)
+    console.out.print(",".join(map(str, chosen)))
 
 
 def _table(mesh: Mesh, chosen: IntArray) -> Table:

@@ -181,7 +181,6 @@ def _table(done: CompletedPose, soft: float) -> Table:
     import numpy as np
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("control")
@@ -199,7 +198,7 @@ def _table(done: CompletedPose, soft: float) -> Table:
         spread = f"{done.std[index]:.3f}" if done.std[index] else ""
         style = "bold" if name in done.given else None
         mark = _mark(done, name, soft)
-        table.add_row(Text(name), f"{value:.3f}", spread, mark, style=style)
+        table.add_row(console.cell(name), f"{value:.3f}", spread, mark, style=style)
     if len(others) > len(shown):
         table.caption = f"{len(others) - len(shown)} more at 0"
         table.caption_justify = "left"

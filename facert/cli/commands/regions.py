@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from facert.cli.shared import console
 from facert.cli.shared.options import TARGET, argument
 from facert.errors import reading
 
@@ -32,4 +31,4 @@ def command(
     found = read_take_file(take, target=target)
     with reading(take):
         regions = find_regions(prepare(found, Settings()).take)
-    typer.echo(regions_text(regions), nl=False)
+    console.write(regions_text(regions))

@@ -30,7 +30,7 @@ from facert.cli.shared.options import (
     option,
 )
 from facert.cli.shared.takes import listed_files, short_names
-from facert.data.text import plural
+from facert.data.text import for_json, plural
 
 if TYPE_CHECKING:
     from facert.data.arrays import IntArray
@@ -82,8 +82,6 @@ def command(
     facert suggest facert-demo/training.h5 -n 12 --sheet suggested.png
     facert suggest facert-demo/training.h5 --have labels
     """
-    import json
-
     from facert.data.matching_takes import as_takes, without_poses
     from facert.errors import reading
     from facert.posing.suggested_frames import suggest_frames
@@ -115,7 +113,7 @@ def command(
     rows = _rows(takes, found)
     if as_json:
         files = {"file": str(paths[0])} if len(paths) == 1 else {"files": list(map(str, paths))}
-        typer.echo(json.dumps(files | {"frames": rows}, indent=2))
+        console.write(for_json(files | {"frames": rows}) + "\n")
     else:
         _print(takes, found, rows)
     if sheet is not None:
@@ -203,7 +201,6 @@ def _headings(takes: Takes, found: Suggestion) -> list[str]:
 def _print(takes: Takes, found: Suggestion, rows: Sequence[dict[str, object]]) -> None:
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
     from facert.data.moments import moment
 
@@ -213,7 +210,7 @@ def _print(takes: Takes, found: Suggestion, rows: Sequence[dict[str, object]]) -
         table.add_column(name, justify="right")
     for place, row in zip(found.takes.tolist(), rows, strict=True):
         frame = int(str(row["frame"]))
-        shown = Text(str(row.get("name", frame)))
+        shown = console.cell(str(row.get("name", frame)))
         table.add_row(shown, moment(takes.parts[place], frame), f"{row['share']:.1%}")
     console.out.print(table)
     whose = "the take's" if len(takes.parts) == 1 else "all takes'"

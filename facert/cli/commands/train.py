@@ -235,11 +235,9 @@ def _require_output(output: Path, curve: Path | None) -> None:
 
 def _print_table(retargeter: Retargeter, output: Path) -> None:
     from rich.table import Table
-    from rich.text import Text
 
     figures = retargeter.figures
-    # Text, not str: a name in brackets is no markup.
-    title = Text(f"{retargeter.settings.method} in {output}")
+    title = console.cell(f"{retargeter.settings.method} in {output}")
     table = Table(title=title, show_header=False)
     for name, value in figures.items():
         table.add_row(

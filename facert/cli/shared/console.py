@@ -1,19 +1,45 @@
-"""The output of every command: results on stdout, everything else on stderr."""
+"""The output of every command: results on stdout, everything else on stderr.
+
+Names and whatever else comes from files are shown as text, whichever way they take: a console here
+knows neither markup nor emoji codes, and escapes what would upset a terminal, also in tables.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from io import TextIOWrapper
+from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Text
 
 from facert.data.subject import subject
+from facert.data.text import printable_lines
 from facert.errors import escaped
 
 
 class _Console(Console):
-    """Console that leaves what to do when nobody reads its output to the command line."""
+    """Console that shows text as text.
+
+    What to do when nobody reads its output is left to the command line.
+    """
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """The text, escaped before a table measures it."""
+        return super().render_str(
+            printable_lines(text), **(options | {"markup": False, "emoji": False})
+        )
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """The pieces of what is shown; what is no text of their own are rich's control codes."""
+        for piece in super().render(renderable, options):
+            yield piece if piece.control else piece._replace(text=printable_lines(piece.text))
 
     def on_broken_pipe(self) -> None:
         """Raise the `BrokenPipeError` that is being handled."""
@@ -35,8 +61,10 @@ class _StderrHandler(logging.Handler):
         warning = record.levelno >= logging.WARNING
         prefix = "warning: " if warning else ""
         prefix += f"{escaped(subject())}: " if subject() else ""
-        lines = map(escaped, self.format(record).split("\n"))  # names in it may be foreign
-        err.print(prefix + "\n".join(lines), style="yellow" if warning else None, markup=False)
+        text = record.getMessage()
+        if "\n" not in str(record.msg):  # else a name in it would begin a line of its own
+            text = escaped(text)
+        err.print(prefix + text, style="yellow" if warning else None)
 
 
 def _is_not_judged(record: logging.LogRecord) -> bool:
@@ -70,11 +98,31 @@ def figure_label(name: str) -> str:
 
 
 def show(text: str) -> None:
-    """Print a line of results as it is: what stands in brackets is no markup."""
-    out.print(text, markup=False)
+    """Print a line of results; what would begin another line is escaped."""
+    out.print(escaped(text))
+
+
+def write(text: str) -> None:
+    """Write text for programs, whole: JSON, TOML or a script, in which nothing is to be escaped."""
+    if sys.stdout is not None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+def cell(text: str) -> Text:
+    """Foreign text for a cell of a table."""
+    return Text(escaped(text))
 
 
 def configure(quiet: bool, verbose: bool) -> None:
     """Send the package's log to stderr: warnings only, notes (default) or details."""
+    show_any_letter()
     log.handlers[:] = [_StderrHandler()]
     log.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+
+
+def show_any_letter() -> None:
+    """Let streams that know only some letters, as in the locale C, escape the others."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

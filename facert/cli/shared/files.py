@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from facert.cli.shared import console
+from facert.data.text import for_json
 from facert.errors import InputError, OutputKeptError, reading
 from facert.io.atomic import write_bytes, write_text
 from facert.io.registry import require_replaceable
@@ -191,10 +192,7 @@ def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
 
 def save_json(content: Mapping[str, object], path: Path, overwrite: bool) -> None:
     """Write JSON for people to read as well."""
-    import json
-
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    save_text(text + "\n", path, overwrite)
+    save_text(for_json(content) + "\n", path, overwrite)
 
 
 def save_text(text: str, path: Path, overwrite: bool) -> None:

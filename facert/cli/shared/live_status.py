@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import time
@@ -11,10 +10,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import typer
 from rich.live import Live
 
 from facert.cli.shared import console
+from facert.data.text import for_json
 from facert.live.frames import Counters
 from facert.live.loop import LiveSession
 from facert.live.timing import RECENT, Pace
@@ -72,7 +71,7 @@ def print_summary(session: LiveSession, written: Sequence[Path], as_json: bool) 
     """Print the summary of a session on stdout."""
     pace = session.meter.pace()
     if as_json:
-        typer.echo(json.dumps(_facts(session.counters, pace, written), indent=2))
+        console.write(for_json(_facts(session.counters, pace, written)) + "\n")
         return
     if session.counters.mapped:
         console.out.print(_pace(pace))

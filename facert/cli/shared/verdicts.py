@@ -10,7 +10,6 @@ from rich.text import Text
 
 from facert.cli.shared import console
 from facert.cli.shared.files import save_json
-from facert.errors import escaped
 
 if TYPE_CHECKING:
     from facert.data.verdict import Reason, Verdict
@@ -36,9 +35,9 @@ def print_verdicts(verdicts: Verdicts, model: Path, many: bool) -> None:
             kinds = dict.fromkeys(reason.kind for reason in reasons[1:])
             lines = [f"{lines[0]} (also: {', '.join(kinds)})"]
         level = Text(f"{verdict.level:10}", style=COLOURS[verdict.level])
-        console.out.print(level, escaped(f"{name:{width}}  {lines[0]}".rstrip()), markup=False)
+        console.out.print(level, console.cell(f"{name:{width}}  {lines[0]}".rstrip()))
         for line in lines[1:]:
-            console.show(f"{'':{width + 13}}{escaped(line)}")
+            console.show(f"{'':{width + 13}}{line}")
 
 
 def _in_words(reason: Reason, take: str, model: Path) -> str:
