@@ -12,7 +12,7 @@ from pathlib import Path
 from facert.data.column_names import Role, role_of_name
 from facert.data.text import listed
 from facert.io.gltf.document import open_gltf
-from facert.io.guarded import encoding_of, read_beginning
+from facert.io.guarded import encoding_of, files_in, read_beginning
 from facert.io.hdf5 import TAKE_FORMAT, stated_format
 from facert.io.lines import separator_of
 from facert.io.live_recording import ENDING
@@ -39,7 +39,7 @@ def takes_in(folder: Path) -> list[Path]:
     """
     takes: list[Path] = []
     others: list[Path] = []
-    for path in sorted(path for path in folder.iterdir() if path.is_file()):
+    for path in files_in(folder):
         (takes if _is_take(path) else others).append(path)
     if others:
         names = listed([path.name for path in others], len(others))
@@ -49,10 +49,8 @@ def takes_in(folder: Path) -> list[Path]:
 
 def _is_take(path: Path) -> bool:
     """Whether a file may be a take, by its name and a look into it."""
-    if path.name.startswith(".") or path.name.endswith("~"):
-        return False  # of the system, of a copy that goes on, of an editor
     found = format_of(path, "read", "take")
-    if found is None:
+    if found is None or path.name.endswith(ENDING):  # a session records, or was killed
         return False
     try:
         return not _is_other(path, found.endings)
@@ -62,8 +60,6 @@ def _is_take(path: Path) -> bool:
 
 def _is_other(path: Path, endings: tuple[str, ...]) -> bool:
     """Whether a file of a format that takes come in is known to be something else."""
-    if ENDING in endings:  # it goes on, or waits for its session to be begun again
-        return True
     if OWN_ENDINGS[0] in endings:
         return stated_format(path) not in ("", TAKE_FORMAT)
     if ".npz" in endings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import logging
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,9 @@ from facert.errors import FacertError, InputError
 
 log = logging.getLogger("facert")
 
+_WORK = re.compile(
+    r"^[.~#]|~$|\.(?:bak|crdownload|download|lock|old|part|partial|swp|temp|tmp)$", re.IGNORECASE
+)
 MAX_BYTES = 2**29
 """Largest file that is read as a whole: half a gibibyte."""
 _COPIES = 3  # of a text are in memory: its bytes, its characters, its lines
@@ -33,6 +37,17 @@ def existing_file(path: Path) -> Path:
         found = "a folder" if path.is_dir() else "no permission" if path.exists() else "nothing"
         raise InputError("file", "an existing file", found, "Check the name.", where=str(path))
     return path
+
+
+def files_in(folder: Path) -> list[Path]:
+    """The files of a folder by name, without hidden ones and what programs leave while they work.
+
+    Such as ``._take.h5`` of a Mac, ``~$take.csv`` of an office, ``take.h5.part`` of a download; and
+    without pipes and devices.
+    """
+    return sorted(
+        path for path in folder.iterdir() if path.is_file() and not _WORK.search(path.name)
+    )
 
 
 def moderate_file(path: Path, most: int = MAX_BYTES) -> Path:

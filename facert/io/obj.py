@@ -15,7 +15,7 @@ import numpy as np
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import Mesh, Rig
 from facert.errors import InputError, reading
-from facert.io.guarded import read_old_text
+from facert.io.guarded import files_in, read_old_text
 from facert.mesh.registration import registered
 
 log = logging.getLogger("facert")
@@ -33,7 +33,7 @@ def read_obj_folder(folder: Path, align: bool = False) -> Rig:
     Raises `InputError` naming the file and the line that is at fault, or two meshes that do not
     belong together.
     """
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".obj")
+    files = [path for path in files_in(folder) if path.suffix.lower() == ".obj"]
     neutral_file = next((path for path in files if path.stem.lower() == NEUTRAL), None)
     shape_files = [path for path in files if path != neutral_file]
     if neutral_file is None or not shape_files:

@@ -1,9 +1,14 @@
 import logging
 import os
+import shutil
+from pathlib import Path
 
 import pytest
 
 from facert.io.folder import takes_in
+from facert.io.obj import read_obj_folder
+
+DATA = Path(__file__).parents[2] / "data"
 
 ODD = {
     "empty.csv": b"",
@@ -35,6 +40,25 @@ def test_what_is_no_file_is_none_to_read(tmp_path):
     (tmp_path / "gone.csv").symlink_to(tmp_path / "nowhere")
     os.mkfifo(tmp_path / "pipe.csv")
     assert takes_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        ".a-1a2b.h5", "._a.h5", ".DS_Store", ".facert-0123456789-77-01234567.h5", "~$a.csv",
+        "~a.csv", "a.csv~", "#a.csv#", ".~lock.a.csv#", "a.h5.part", "a.h5.crdownload", "a.h5.tmp",
+        "a.csv.bak", "a.h5.recording",
+    ],
+)  # fmt: skip
+def test_leftovers_and_files_of_the_system_are_no_takes(name, tmp_path):
+    take, rig = DATA / "performance.h5", tmp_path / "rig"
+    shutil.copy(take, tmp_path / name)
+    assert takes_in(tmp_path) == []
+    rig.mkdir()
+    for mesh in ("neutral.obj", "smile.obj"):
+        (rig / mesh).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (rig / f"._{name}.obj").write_bytes(b"\0\5\x16\7")
+    assert read_obj_folder(rig).names == ("smile",)
 
 
 def test_an_unexpected_error_leaves_it_to_reading(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ import re
 import unicodedata
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -142,6 +143,8 @@ def write_poses(path: str, poses: Sequence[Pose], fps: float) -> None:
             _write_csv(temporary, poses)
         Path(temporary).replace(path)
     except OSError as error:
+        with suppress(OSError):
+            Path(temporary).unlink()
         raise ScriptError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
@@ -162,7 +165,8 @@ def _write_h5(path: str, poses: Sequence[Pose], fps: float) -> None:
         fix = "write a .csv, which facert convert --poses reads as well"
         raise ScriptError(f"this program's Python has no h5py for a .h5: {fix}") from None
     values = [list(pose.values.values()) for pose in poses]
-    with h5py.File(path, "w") as file:
+    # In memory first: HDF5 crashes at the end of a program whose file it could not write.
+    with h5py.File(path, "w", driver="core", backing_store=False) as file:
         file.attrs.update({"format": "facert-take", "format_version": 1, "fps": fps, "units": ""})
         file["time"] = [pose.seconds for pose in poses]
         for group, name in (("source", "weights"), ("target", "params")):
@@ -170,6 +174,9 @@ def _write_h5(path: str, poses: Sequence[Pose], fps: float) -> None:
             file.create_dataset(
                 f"{group}/names", data=list(poses[0].values), dtype=h5py.string_dtype()
             )
+        file.flush()
+        content = file.id.get_file_image()
+    Path(path).write_bytes(content)
 
 
 def keys(curves: Curves, name: str) -> list[Key]:

@@ -18,6 +18,7 @@ from facert.data.verdict import Verdict
 from facert.errors import InputError, reading
 from facert.io.curves import read_json_object
 from facert.io.formats import read_take_file
+from facert.io.guarded import files_in
 from facert.io.hdf5 import RIG_FORMAT, TAKE_FORMAT, stated_format
 from facert.io.registry import OWN_ENDINGS
 from facert.io.rig import read_rig
@@ -182,7 +183,7 @@ def _is_evaluation(path: Path) -> bool:
 
 def _files(folder: Path, *endings: str) -> list[Path]:
     """The first files with such an ending, by name."""
-    found = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings]
+    found = [path for path in files_in(folder) if path.suffix.lower() in endings]
     if len(found) > MOST:
         log.warning("%s: the first %d of %d %s files", folder, MOST, len(found), endings[0])
     return found[:MOST]
