@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.data.text import plural
+from facert.data.text import from_csv, plural
 from facert.errors import InputError
 from facert.io.guarded import encoding_of, existing_file, read_text
 
@@ -65,7 +65,7 @@ def read_header(path: Path) -> tuple[str, ...]:
         cells = next(csv.reader([line], delimiter=separator), [])
     except csv.Error:  # whoever reads the rows says where
         cells = line.split(separator)
-    return tuple(cell.strip() for cell in cells)
+    return tuple(from_csv(cell.strip()) for cell in cells)
 
 
 def _without_preamble(lines: Sequence[str]) -> list[str]:
@@ -101,7 +101,8 @@ def read_csv(path: Path) -> tuple[tuple[str, ...], list[Line]]:
 def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Line]]:
     """Parse a CSV text with a header; a separator that is given is followed to the letter.
 
-    Else it is the one that the header shows, and blanks around names do not count.
+    Else it is the one that the header shows, and blanks around names do not count. An apostrophe
+    before a name that would be a formula is no part of it, see `facert.data.text.for_csv`.
 
     Blank lines are skipped. Where the header is separated by semicolons or tabs, as Excel does in
     much of Europe, so are the rows, and their numbers may have decimal commas.
@@ -129,7 +130,7 @@ def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Lin
         raise InputError("file", "a header and rows", plural(len(rows), "line"), "Export it again.")
     body = rows[1:] if separator == "," else with_points(rows[1:])
     header = rows[0].cells
-    return tuple(cell.strip() if stripped else cell for cell in header), body
+    return tuple(from_csv(cell.strip() if stripped else cell) for cell in header), body
 
 
 def separator_of(header: str) -> str:

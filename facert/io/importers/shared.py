@@ -19,6 +19,8 @@ Read = TypeVar("Read")
 CLOCKS = ("time", "seconds", "time_s")
 MAX_RATE, MAX_SECONDS, MAX_FRAME = 1e4, 1e6, 10**7
 """Most of what a file may state; programs count frames in 32 bits."""
+_FORMULA = re.compile(r"'*(?:\s*[=+\-@\uff1d\uff0b\uff0d\uff20]|[\t\r\n])")
+"""Of a name: see `facert.data.text.for_csv`."""
 
 
 class ScriptError(Exception):
@@ -151,7 +153,7 @@ def write_poses(path: str, poses: Sequence[Pose], fps: float) -> None:
 def _write_csv(path: str, poses: Sequence[Pose]) -> None:
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(["frame", "seconds", *poses[0].values])
+        writer.writerow(["frame", "seconds", *map(_as_text, poses[0].values)])
         for pose in poses:
             values = [f"{round(value, 6) + 0.0:.6g}" for value in pose.values.values()]
             writer.writerow([pose.frame, f"{pose.seconds:.6f}", *values])
@@ -331,7 +333,12 @@ def _table(path: str) -> tuple[list[str], list[list[str]]]:
     with open(path, encoding="utf-8-sig", newline="") as file:
         header, *rows = [row for row in csv.reader(file) if row]
     _require_widths(rows, len(header))
-    return header, rows
+    return [cell[1:] if cell[:1] == "'" and _FORMULA.match(cell) else cell for cell in header], rows
+
+
+def _as_text(name: str) -> str:
+    """A name for a table, with an apostrophe where a spreadsheet would take it for a formula."""
+    return f"'{name}" if _FORMULA.match(name) else name
 
 
 def _require_widths(rows: Sequence[Sequence[Any]], width: int) -> None:

@@ -28,7 +28,7 @@ from facert.data.arrays import FloatArray
 from facert.data.columns import learnable, require_there
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_columns
-from facert.data.text import printable
+from facert.data.text import for_csv, from_csv, printable
 from facert.errors import InputError, reading
 from facert.io.atomic import write_text
 from facert.io.guarded import encoding_of, read_beginning, read_text
@@ -55,7 +55,6 @@ log = logging.getLogger("facert")
 
 _MARKS = {"weights": "time (weights)", "markers": "time (markers)"}
 _LONGEST = max(map(len, _MARKS.values()))
-_QUOTED = re.compile(r'[",\r\n]')
 _NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 
 
@@ -139,10 +138,10 @@ def _is_own(text: str) -> bool:
     Some writers quote all names, or all text. Where that would be the same line, the first cell
     must state what the columns are.
     """
-    cells = next(csv.reader(io.StringIO(text, newline="")), [])
+    cells = [from_csv(cell) for cell in next(csv.reader(io.StringIO(text, newline="")), [])]
     if not cells or not text.startswith(_header(cells)):
         return False
-    unquoted = [cell for cell in cells[1:] if not _QUOTED.search(cell)]
+    unquoted = [cell for cell in map(for_csv, cells[1:]) if not cell.startswith('"')]
     return cells[0] in _MARKS.values() or not all(map(_NUMBER.fullmatch, unquoted))
 
 
@@ -206,9 +205,7 @@ def _in_digits(values: FloatArray) -> FloatArray:
 def _header(cells: Sequence[str]) -> str:
     """The first line of a table, with quotes around its first cell, and around others as needed."""
     first, *others = cells
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(others)
-    return f'"{first}",{line.getvalue()}'
+    return ",".join([f'"{first}"', *map(for_csv, others)]) + "\n"
 
 
 def _reads_back(names: Sequence[str], time: FloatArray, values: FloatArray, markers: bool) -> bool:

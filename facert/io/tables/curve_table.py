@@ -10,8 +10,6 @@ times in single precision, and refuses a row whose name or time it has already.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -23,6 +21,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_curves
+from facert.data.text import for_csv, from_csv
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError
 from facert.io.atomic import write_text
@@ -80,7 +79,7 @@ def read_csv_curves(text: str) -> Take:
         found, fix = ", ".join(header[1:4]), "Write a row a curve, and a column a time."
         raise InputError("header", "times in seconds", found, fix) from None
     values = to_numbers(rows, header, range(1, len(header)))
-    return _take(tuple(row.cells[0] for row in rows), time, values.T)
+    return _take(tuple(from_csv(row.cells[0]) for row in rows), time, values.T)
 
 
 def take_of_json_curves(rows: Sequence[Mapping[str, Any]]) -> Take:
@@ -128,12 +127,10 @@ def _csv(names: tuple[str, ...], time: list[str], values: FloatArray) -> str:
         found = f"none for {names[column]!r} in frame {frame}"
         fix = "Write a .curvetable.json, or fill the gaps: facert clean."
         raise InputError("values", "a number in every frame", found, fix)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow([CREATED_BY, *time])
+    rows = [[CREATED_BY, *time]]
     for name, row in zip(names, values.T, strict=True):
-        writer.writerow([name, *(f"{value:.9g}" for value in row)])
-    return text.getvalue()
+        rows.append([for_csv(name), *(f"{value:.9g}" for value in row)])
+    return "".join(",".join(row) + "\r\n" for row in rows)
 
 
 def _json(names: tuple[str, ...], time: list[str], values: FloatArray) -> str:
