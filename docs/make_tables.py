@@ -6,8 +6,9 @@ import json
 import re
 from pathlib import Path
 
+from facert.data.typed import choices
 from facert.io.registry import table_rows
-from facert.settings import DEFAULTS, DESCRIBED, choices, default_text
+from facert.settings import DEFAULTS, DESCRIBED, default_text
 
 DOCS = Path(__file__).parent
 _TABLE = re.compile(r"<!-- (\w+): made by make docs -->\n.*?<!-- end of \1 -->", re.DOTALL)

@@ -7,19 +7,19 @@ table in the documentation are made from the fields: another setting is another 
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from facert.data.regions import AUTO, Regions
-from facert.data.text import did_you_mean
+from facert.data.typed import choices, require_type
 from facert.errors import InputError
 
 OptimiserName = Literal["lbfgs", "scg"]
 LimitRule = Literal["auto", "declared", "none"]
 Likelihood = Literal["auto", "exact", "vfe", "fitc"]
 
+FIX = "Change the setting."
 EVERYDAY, SHARED, FINE = "Options", "Shared models", "In a config file alone"
 
 
@@ -145,7 +145,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name, (kind, _) in DESCRIBED.items():
-            _check_type(name, getattr(self, name), kind)
+            require_type(kind, getattr(self, name), name, FIX)
         for name, (_, about) in DESCRIBED.items():
             about.check(name, getattr(self, name))
         if isinstance(self.regions, str) and self.regions != AUTO:
@@ -184,12 +184,6 @@ OF_SHARED = tuple(name for name, (_, about) in DESCRIBED.items() if about.group 
 """Settings that only the shared models use."""
 
 
-def choices(kind: Any) -> tuple[str, ...]:
-    """The words that a type allows; none where it is no literal."""
-    options = get_args(kind)
-    return options if all(isinstance(option, str) for option in options) else ()
-
-
 def default_text(name: str) -> str:
     """The default of a setting, or what it stands for."""
     default = getattr(DEFAULTS, name)
@@ -208,25 +202,8 @@ def _parameters() -> str:
     return "\n    ".join(lines)
 
 
-def _check_type(name: str, value: object, hint: Any) -> None:
-    words = choices(hint)
-    if words:
-        if value not in words:
-            fix = did_you_mean(str(value), words, "Change the setting.")
-            raise InputError(name, "one of " + ", ".join(words), repr(value), fix)
-        return
-    allowed = get_args(hint) or (hint,)
-    if float in allowed:
-        allowed = (*allowed, int)
-    if isinstance(value, bool) != (bool in allowed) or not isinstance(value, allowed):
-        kinds = " or ".join(kind.__name__ for kind in allowed if kind is not type(None))
-        raise _bad(name, kinds, value)
-    if isinstance(value, float) and not math.isfinite(value):
-        raise _bad(name, "a finite number", value)
-
-
 def _bad(name: str, expected: str, value: object) -> InputError:
-    return InputError(name, expected, repr(value), "Change the setting.")
+    return InputError(name, expected, repr(value), FIX)
 
 
 DEFAULTS = Settings()

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Annotated, Self, get_origin, get_type_hints
+from typing import Annotated, Protocol, Self, TypeVar, get_origin, get_type_hints
 
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 
+Array = TypeVar("Array")
 DAMAGED = "The model file is damaged: train it again."
+
+
+class Shaped(Protocol):
+    """An array, or what a file declares of one."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The size of each axis."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +81,7 @@ class ArrayGroup:
         return arrays, {name: kind for name, kind in types.items() if name not in arrays}
 
 
-def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dict[str, int]:
+def check_axes(arrays: Mapping[str, Shaped], axes: Mapping[str, str]) -> dict[str, int]:
     """The size that each letter stands for, found in the arrays; see `ArrayGroup`.
 
     Raises `InputError` when an array is absent or empty, or its shape is not as spelt.
@@ -79,7 +89,7 @@ def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dic
     sizes: dict[str, int] = {}
     for name, letters in axes.items():
         array = arrays.get(name)
-        if array is None or array.ndim != len(letters) or not array.size:
+        if array is None or len(array.shape) != len(letters) or 0 in array.shape:
             found = "nothing" if array is None else f"shape {array.shape}"
             raise InputError(name, f"an array of {len(letters)} dimensions", found, DAMAGED)
         for letter, size in zip(letters, array.shape, strict=True):
@@ -87,3 +97,16 @@ def check_axes(arrays: Mapping[str, FloatArray], axes: Mapping[str, str]) -> dic
             if size != expected:
                 raise InputError(name, f"{expected} for {letter}", f"shape {array.shape}", DAMAGED)
     return sizes
+
+
+def require_known_arrays(arrays: Iterable[str], known: Collection[str]) -> None:
+    """Refuse names of arrays that nobody would read, with an `InputError`."""
+    unknown = next((name for name in arrays if name not in known), None)
+    if unknown is not None:
+        fix = "Install the facert that wrote it, or train it again."
+        raise InputError(unknown, "no such array", "one", fix)
+
+
+def part_of(arrays: Mapping[str, Array], prefix: str) -> dict[str, Array]:
+    """The arrays whose names begin with a prefix, by the rest of their names."""
+    return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}

@@ -137,12 +137,12 @@ def parsing(
 
     Hostile bytes raise struct.error, KeyError, OverflowError and more, which nobody can list.
 
-    Raises `InputError` instead of any other exception but facert's own, and those of the system
-    about a file.
+    Raises `InputError` instead of any other exception but facert's own, want of memory, and those
+    of the system about a file.
     """
     try:
         yield
-    except FacertError:
+    except (FacertError, MemoryError):
         raise
     except Exception as error:
         if isinstance(error, OSError) and error.filename is not None:

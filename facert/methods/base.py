@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
+from facert.data.array_group import Shaped
 from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.models.optim.monitor import Monitor
@@ -138,8 +139,20 @@ class Method(Protocol):
         """The arrays that were learned, by their names."""
         ...
 
+    def check(self, arrays: Mapping[str, Shaped]) -> tuple[int, int]:
+        """Dimensions d_x and d_y of arrays that `load` could take over, by their shapes alone.
+
+        A file is asked before any array of it is read.
+
+        Raises
+        ------
+        InputError
+            When an array is absent or unknown, or shapes do not fit together.
+        """
+        ...
+
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Take over what `save` returned; raises InputError when shapes do not fit together."""
+        """Take over what `save` returned; raises InputError as `check`, and for wrong numbers."""
         ...
 
 

@@ -11,6 +11,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import FLOAT, require_memory
 from facert.methods.regression import Map, SupervisedRegression
 
 # Enough for a frame that was posed twice, differently, to be no contradiction.
@@ -35,6 +36,8 @@ class InterpolatingMap(Map):
 
     @cached_property
     def _interpolator(self) -> RBFInterpolator:
+        n = len(self.X)
+        require_memory(2 * FLOAT * n**2, f"interpolation between {n} poses", "Train on fewer.")
         return RBFInterpolator(
             self.X, self.Y, kernel="linear", degree=0, smoothing=self.smoothing.item()
         )

@@ -11,6 +11,7 @@ import numpy as np
 
 from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
+from facert.data.memory import FLOAT, require_memory
 from facert.errors import InputError
 from facert.methods.base import Labelled
 from facert.methods.regression import Map, Variance
@@ -53,6 +54,8 @@ class ProcessMap(Map):
     @cached_property
     def whitening(self) -> FloatArray:
         """L⁻ᵀ, where L Lᵀ = K, (n, n)."""
+        n = len(self.X)
+        require_memory(4 * FLOAT * n**2, f"a kernel of {n} poses", "Train on fewer.")
         return np.ascontiguousarray(whitener(self.kernel.gram(self.X)).T)
 
     @cached_property

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, ArrayGroup, check_axes
+from facert.data.array_group import DAMAGED, ArrayGroup, Shaped, check_axes, require_known_arrays
 from facert.data.arrays import FloatArray, rms
 from facert.errors import InputError
 from facert.methods.base import Labelled, Prediction, Stream, TrainingReport, Unlabelled, stacked
@@ -172,6 +172,16 @@ class Regression(ABC):
             **arrays,
         }
 
+    def check(self, arrays: Mapping[str, Shaped]) -> tuple[int, int]:
+        """Dimensions d_x and d_y of arrays that `load` could take over; see `Method.check`."""
+        axes = {f"map.{name}": letters for name, letters in self.map_type.all_axes().items()}
+        if self.map_type.predicts_std:
+            axes["source.response"] = "xy"
+        axes = {"source.mean": "x", "source.covariance": "xx", **axes}
+        require_known_arrays(arrays, axes)
+        sizes = check_axes(arrays, axes)
+        return sizes["x"], sizes["y"]
+
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned.
 
@@ -180,10 +190,7 @@ class Regression(ABC):
         InputError
             When an array is absent or the shapes do not fit together.
         """
-        of_map = {f"map.{name}": axes for name, axes in self.map_type.all_axes().items()}
-        if self.map_type.predicts_std:
-            of_map["source.response"] = "xy"
-        check_axes(arrays, {"source.mean": "x", "source.covariance": "xx", **of_map})
+        self.check(arrays)
         try:
             np.linalg.cholesky(arrays["source.covariance"])
         except np.linalg.LinAlgError:

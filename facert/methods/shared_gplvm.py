@@ -18,8 +18,9 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED
+from facert.data.array_group import DAMAGED, Shaped, require_known_arrays
 from facert.data.arrays import FloatArray, rms
+from facert.data.memory import FLOAT, require_memory
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.methods.base import (
@@ -32,7 +33,7 @@ from facert.methods.base import (
     stacked,
 )
 from facert.methods.noise import with_noise
-from facert.methods.views import view_arrays, view_from
+from facert.methods.views import view_arrays, view_from, view_sizes
 from facert.models.device import find_device
 from facert.models.gp.posterior import Predictor
 from facert.models.gp.sparse import ApproximationName
@@ -41,7 +42,7 @@ from facert.models.gplvm.frame_mapping import FrameMapping
 from facert.models.gplvm.initial_latents import align, principal_components
 from facert.models.gplvm.lle import constraint_matrix, view_rows
 from facert.models.gplvm.module import GaussianView, SharedGPLVM
-from facert.models.gplvm.source_mapping import Mapped, Observation, SourceMapping
+from facert.models.gplvm.source_mapping import CHUNK, Mapped, Observation, SourceMapping
 from facert.models.gplvm.sparse_view import SparseView, inducing_rows, row_weights
 from facert.models.gplvm.staging import Core, TrainedViews
 from facert.models.gplvm.target_mapping import map_to_target
@@ -155,6 +156,19 @@ class SemiSupervisedSGPLVM:
         """The arrays of both trained views, see `facert.methods.views`."""
         return view_arrays(self.source_, "source") | view_arrays(self.target_, "target")
 
+    def check(self, arrays: Mapping[str, Shaped]) -> tuple[int, int]:
+        """Dimensions d_x and d_y of arrays that `load` could take over; see `Method.check`."""
+        require_known_arrays(
+            arrays, [name for name in arrays if name.startswith(("source.", "target."))]
+        )
+        source, target = (view_sizes(arrays, view) for view in ("source", "target"))
+        if target["q"] != source["q"]:
+            expected, found = f"{source['q']} dimensions", f"{target['q']}"
+            raise InputError("target.latents", expected, found, DAMAGED)
+        steps = CHUNK * source["q"] * sum(source.values())  # of Newton's method on a batch
+        require_memory(FLOAT * steps, "source.latents")
+        return source["d"], target["d"]
+
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned.
 
@@ -163,12 +177,10 @@ class SemiSupervisedSGPLVM:
         InputError
             When an array is absent or the shapes do not fit together.
         """
+        self.check(arrays)
         if self.settings.sigma_c is None or self.settings.sigma_t is None:
             raise InputError("settings", "numbers as sigma_c and sigma_t", "none", DAMAGED)
         source, target = map(view_from, (arrays, arrays), ("source", "target"), self._kernels)
-        q, found = source.Z.shape[1], target.Z.shape[1]
-        if found != q:
-            raise InputError("target.latents", f"{q} dimensions", f"{found}", DAMAGED)
         self._set_views(source, target)
 
     def _set_views(self, source: Predictor, target: Predictor) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, check_axes
+from facert.data.array_group import DAMAGED, Shaped, check_axes, part_of, require_known_arrays
 from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.models.gp.posterior import Posterior, Predictor
@@ -34,22 +34,33 @@ def view_arrays(view: Predictor, name: str) -> dict[str, FloatArray]:
     return {f"{name}.{part}": array for part, array in arrays.items()}
 
 
-def view_from(arrays: Mapping[str, FloatArray], name: str, kernel_type: type[Kernel]) -> Predictor:
-    """A view from the arrays of a file, where they bear its name.
+def view_sizes(arrays: Mapping[str, Shaped], name: str) -> dict[str, int]:
+    """The sizes of a view that `view_from` could make: "q", "d", and "n" or "m".
 
     Raises
     ------
     InputError
-        When one is absent, or their shapes do not fit together.
+        When an array is absent or unknown, or shapes do not fit together.
     """
-    own = {n.removeprefix(f"{name}."): a for n, a in arrays.items() if n.startswith(f"{name}.")}
-    sparse = "whitener" in own
-    axes = {f"{name}.{part}": letters for part, letters in (SPARSE if sparse else EXACT).items()}
-    check_axes(arrays, axes)
+    axes = SPARSE if f"{name}.whitener" in arrays else EXACT
+    spelt = {f"{name}.{part}": letters for part, letters in axes.items()}
+    require_known_arrays([n for n in arrays if n.startswith(f"{name}.")], spelt)
+    return check_axes(arrays, spelt)
+
+
+def view_from(arrays: Mapping[str, FloatArray], name: str, kernel_type: type[Kernel]) -> Predictor:
+    """A view from the arrays of a file, where they bear its name; see `view_sizes`.
+
+    Raises
+    ------
+    InputError
+        For numbers that no kernel has.
+    """
+    own = part_of(arrays, f"{name}.")
     theta = own["kernel"]
     if not (theta > 0).all():
         raise InputError(f"{name}.kernel", "three positive numbers", f"{theta}", DAMAGED)
     kernel = kernel_type(*theta.tolist())
-    if sparse:
+    if "whitener" in own:
         return Predictor(own["latents"], own["whitener"], own["weights"], kernel)
     return Posterior(own["latents"], own["observations"], kernel)

@@ -22,7 +22,14 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
-from facert.data.array_group import DAMAGED, ArrayGroup
+from facert.data.array_group import (
+    DAMAGED,
+    ArrayGroup,
+    Shaped,
+    check_axes,
+    part_of,
+    require_known_arrays,
+)
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import MOST
@@ -214,6 +221,24 @@ class Regional:
             arrays |= {f"{index}.{name}": array for name, array in part.method.save().items()}
         return arrays
 
+    def check(self, arrays: Mapping[str, Shaped]) -> tuple[int, int]:
+        """Dimensions d_x and d_y of arrays that `load` could take over; see `Method.check`.
+
+        Which columns a region has, the numbers of the layout say: here they are no more than all.
+        """
+        parts = [f"{index}." for index in range(len(self._names))]
+        layout = {f"layout.{name}": letters for name, letters in RegionLayout.all_axes().items()}
+        require_known_arrays([n for n in arrays if not n.startswith(tuple(parts))], layout)
+        sizes = check_axes(arrays, layout)
+        self._require_count(sizes["r"])
+        untrained = make_method(replace(self.settings, regions=None))
+        for name, part in zip(self._names, parts, strict=True):
+            d_x, d_y = untrained.check(part_of(arrays, part))
+            if d_x > sizes["x"] or d_y > sizes["y"]:
+                expected = f"at most {sizes['x']} and {sizes['y']} columns"
+                raise InputError(f"region {name}", expected, f"{d_x} and {d_y}", DAMAGED)
+        return sizes["x"], sizes["y"]
+
     def load(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over what `save` returned.
 
@@ -222,14 +247,10 @@ class Regional:
         InputError
             When an array is absent or the shapes do not fit together.
         """
-        try:
-            self._set_layout(RegionLayout.of(arrays, "layout."))
-        except KeyError as error:
-            raise InputError("method", "regions", f"no {error.args[0]}", DAMAGED) from None
+        self.check(arrays)
+        self._set_layout(RegionLayout.of(arrays, "layout."))
         for index, part in enumerate(self.parts_):
-            start = f"{index}."
-            own = {n.removeprefix(start): a for n, a in arrays.items() if n.startswith(start)}
-            part.method.load(own)
+            part.method.load(part_of(arrays, f"{index}."))
             if part.method.dimensions != (len(part.columns), len(part.controls)):
                 expected = f"{len(part.columns)} and {len(part.controls)} columns"
                 found = f"{part.method.dimensions}"
@@ -240,10 +261,12 @@ class Regional:
         regions = self.settings.regions
         return [] if regions is None or isinstance(regions, str) else regions.names
 
+    def _require_count(self, count: int) -> None:
+        if count != len(self._names):
+            raise InputError("layout", f"{len(self._names)} regions", f"{count}", DAMAGED)
+
     def _set_layout(self, layout: RegionLayout) -> None:
-        if len(layout.columns) != len(self._names):
-            expected, found = f"{len(self._names)} regions", f"{len(layout.columns)}"
-            raise InputError("layout", expected, found, DAMAGED)
+        self._require_count(len(layout.columns))
         self.layout_ = layout
         self.parts_ = [self._part(index) for index in range(len(layout.columns))]
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from facert.data.array_group import Shaped, part_of
 from facert.data.arrays import FloatArray
-from facert.data.version import CREATED_BY
 from facert.errors import InputError
 from facert.io.atomic import Appended, write_text
 from facert.io.guarded import read_text
@@ -24,6 +25,13 @@ log = logging.getLogger(__name__)
 
 FORMAT = "facert-checkpoint"
 _MEMORY = "memory."
+
+
+@dataclass(frozen=True)
+class CheckpointMetadata:
+    """What a checkpoint says beside its arrays."""
+
+    fingerprint: str  # Of the data and the settings
 
 
 def checkpoint_path(model: Path) -> Path:
@@ -69,8 +77,8 @@ class CheckpointFile(Monitor):
         if not self.path.exists():
             log.warning("no checkpoint %s: training begins anew", self.path)
             return None
-        arrays, metadata = read_tensors(self.path, FORMAT)
-        if metadata.get("fingerprint") != fingerprint:
+        arrays, metadata = read_tensors(self.path, FORMAT, CheckpointMetadata, _check_shapes)
+        if metadata.fingerprint != fingerprint:
             raise InputError(
                 "fingerprint",
                 "a checkpoint of the same take and settings",
@@ -78,7 +86,7 @@ class CheckpointFile(Monitor):
                 "Give the options of that run, or train without --resume.",
                 str(self.path),
             )
-        return _progress(arrays, str(self.path))
+        return _progress(arrays)
 
     def checkpoint(self, progress: Progress) -> None:
         """Write the progress, replacing the last."""
@@ -89,13 +97,8 @@ class CheckpointFile(Monitor):
             "scalars": np.array([state.value, state.gradient_norm, float(state.iterations)]),
             **{_MEMORY + name: array for name, array in state.memory.items()},
         }
-        metadata = {
-            "format": FORMAT,
-            "format_version": 1,
-            "created_by": CREATED_BY,
-            "fingerprint": self._fingerprint,
-        }
-        write_tensors(self.path, arrays, metadata, overwrite=True)
+        metadata = CheckpointMetadata(self._fingerprint)
+        write_tensors(self.path, arrays, metadata, FORMAT, overwrite=True)
 
     def remove(self) -> None:
         """Delete the file: the model is complete."""
@@ -170,18 +173,19 @@ class Monitors(Monitor):
             part.checkpoint(progress)
 
 
-def _progress(arrays: Mapping[str, FloatArray], where: str) -> Progress:
-    try:
-        value, gradient_norm, iterations = arrays["scalars"]
-        x, curve = arrays["x"], arrays["curve"]
-    except (KeyError, ValueError):
-        raise InputError(
-            "the arrays", "x, curve and scalars", ", ".join(arrays), "Train anew.", where
-        ) from None
-    memory = {
-        name.removeprefix(_MEMORY): array
-        for name, array in arrays.items()
-        if name.startswith(_MEMORY)
-    }
-    state = State(x, float(value), float(gradient_norm), int(iterations), memory)
-    return Progress(state, tuple(curve.tolist()))
+def _check_shapes(declared: Mapping[str, Shaped], metadata: CheckpointMetadata) -> None:  # noqa: ARG001  they have no say in it
+    """Refuse arrays that are no progress; `facert.models.gplvm.fitting` knows how long x is."""
+    own = {name: array.shape for name, array in declared.items() if not name.startswith(_MEMORY)}
+    vectors = {name: len(shape) for name, shape in own.items()}
+    if vectors != dict.fromkeys(("x", "curve", "scalars"), 1) or own["scalars"] != (3,):
+        raise InputError("the arrays", "x, curve and 3 scalars", ", ".join(own), "Train anew.")
+    for name, memory in part_of(declared, _MEMORY).items():
+        if memory.shape != own["x"] and not (name == "scalars" and memory.shape in ((2,), (3,))):
+            found = f"shape {memory.shape}"
+            raise InputError(_MEMORY + name, f"shape {own['x']}", found, "Train anew.")
+
+
+def _progress(arrays: Mapping[str, FloatArray]) -> Progress:
+    value, gradient_norm, iterations = arrays["scalars"].tolist()
+    state = State(arrays["x"], value, gradient_norm, int(iterations), part_of(arrays, _MEMORY))
+    return Progress(state, tuple(arrays["curve"].tolist()))

@@ -17,12 +17,13 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Source, Take
-from facert.errors import InputError, NumericalError
+from facert.errors import InputError
 from facert.models.threads import threads_for
 from facert.preprocess.clean_source import clean_source
 from facert.preprocess.motion.estimate import FEWEST
 from facert.preprocess.motion.series import even_grid
 from facert.preprocess.source_layout import SourceColumns
+from facert.retarget.finite import mapping
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import novelty_warning
@@ -72,6 +73,8 @@ class Retargeter(TrainedModel):
             When the device is not there.
         InputError
             When the source is of another kind or lacks names that the model needs.
+        NumericalError
+            When the model's numbers give no finite poses.
         """
         options = options or RetargetOptions()
         if mode not in get_args(Mode):
@@ -84,12 +87,10 @@ class Retargeter(TrainedModel):
                 "name such frames in training as well"
             )
         there = self if device == "cpu" else replace(self, method=self.method.on(device))
-        try:
+        with mapping():
             if mode == "online":
                 return self._one_by_one(take, options)
             return there._together(take, options)
-        except (np.linalg.LinAlgError, OverflowError):
-            raise NumericalError("the model's numbers are too large or small to map with") from None
 
     def stream(
         self,

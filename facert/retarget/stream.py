@@ -17,6 +17,7 @@ from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import SourceColumns
+from facert.retarget.finite import mapping
 from facert.retarget.model import TrainedModel
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
 
@@ -153,8 +154,13 @@ class RetargetStream:
         ------
         InputError
             For another shape, or numbers that are infinite.
+        NumericalError
+            When the model's numbers give no finite pose.
         """
-        values = self._checked(values)
+        with mapping():
+            return self._step(self._checked(values))
+
+    def _step(self, values: FloatArray) -> Streamed:
         self.prepare()
         row, seen = self._observed(values)
         if self._calibration is not None:
@@ -219,9 +225,10 @@ class RetargetStream:
 
     def _completed(self, predicted: Prediction) -> tuple[FloatArray | None, FloatArray]:
         """Standard deviation of the pose, and the cleaned source."""
-        source = self._model.source_units.undo(predicted.X[0])
-        std = None if predicted.std is None else self._scale.std(predicted.std[0])
-        return std, source.reshape(self._cleaned_shape)
+        with mapping():
+            source = self._model.source_units.undo(predicted.X[0])
+            std = None if predicted.std is None else self._scale.std(predicted.std[0])
+            return std, source.reshape(self._cleaned_shape)
 
 
 def _filter(

@@ -12,7 +12,7 @@ import facert as api
 from facert.cli.commands.train import _shown
 from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import write_tensors
-from facert.retarget.checkpoint import checkpoint_path
+from facert.retarget.checkpoint import CheckpointMetadata, checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
 # A method that trains step by step.
@@ -198,7 +198,7 @@ def test_a_method_that_learns_in_one_go_warns_of_what_it_has_no_use_for(
 
 def test_a_method_that_learns_in_one_go_leaves_the_checkpoint_of_another_alone(facert, take, model):
     checkpoint_path(model).write_text("where another run stopped")
-    write_tensors(model, {}, {})
+    write_tensors(model, {}, CheckpointMetadata(""), "facert-model")
     before = model.read_bytes()
 
     refused = facert("train", take, "-o", model, "--resume")

@@ -26,7 +26,7 @@ from facert.io.registry import FORMATS, is_foreign, require_replaceable
 from facert.io.take import holds_recording, holds_result
 from facert.io.tensors import write_tensors
 from facert.mesh.morphs import Morphs
-from facert.retarget.checkpoint import CurveLog
+from facert.retarget.checkpoint import CheckpointMetadata, CurveLog
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 RIG = Rig(TRIANGLE, np.ones((1, 3, 3)), ("jawOpen",), np.array([[0, 1, 2]]), "cm")
@@ -67,7 +67,7 @@ OWN: dict[str, Callable[[Path, bool], None]] = {
     "face.usdc": write_usd,
     "face.usd": write_usd,
     "model.safetensors": lambda path, over: write_tensors(
-        path, {"x": np.ones(2)}, {"format": "f", "format_version": 1}, over
+        path, {"x": np.ones(2)}, CheckpointMetadata(""), "facert-checkpoint", over
     ),
 }
 

@@ -8,7 +8,14 @@ from facert.io.tensors import write_tensors
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State
 from facert.models.optim.scg import SCG
-from facert.retarget.checkpoint import CheckpointFile, CurveLog, Monitors, checkpoint_path
+from facert.retarget.checkpoint import (
+    FORMAT,
+    CheckpointFile,
+    CheckpointMetadata,
+    CurveLog,
+    Monitors,
+    checkpoint_path,
+)
 
 
 def bowl(x):
@@ -70,9 +77,8 @@ def test_a_checkpoint_of_another_run_is_refused(path, progress):
 
 
 def test_a_checkpoint_without_its_arrays_is_refused(path):
-    metadata = {"format": "facert-checkpoint", "format_version": 1, "fingerprint": "a"}
-    write_tensors(path, {"x": np.zeros(2)}, metadata)
-    with pytest.raises(InputError, match="expected x, curve and scalars"):
+    write_tensors(path, {"x": np.zeros(2)}, CheckpointMetadata("a"), FORMAT)
+    with pytest.raises(InputError, match="expected x, curve and 3 scalars"):
         CheckpointFile(path, resume=True).resume("a")
 
 

@@ -23,6 +23,7 @@ from facert.cli.shared.options import (
 )
 from facert.cli.shared.signals import signals
 from facert.cli.shared.takes import listed_files, read_takes
+from facert.data.typed import choices
 from facert.errors import InputError, reading
 from facert.io.registry import require_replaceable
 from facert.methods.registry import REGISTRY
@@ -33,7 +34,6 @@ from facert.settings import (
     OF_SHARED,
     SHARED,
     Settings,
-    choices,
     default_text,
 )
 

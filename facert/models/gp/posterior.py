@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import FLOAT, require_memory
 from facert.models.gp.jitter import whitener
 from facert.models.kernels import Kernel
 
@@ -168,5 +169,6 @@ class Posterior(Predictor):
 
     def __init__(self, Z: FloatArray, X: FloatArray, kernel: Kernel) -> None:
         self.X = X
+        require_memory(4 * FLOAT * len(Z) ** 2, f"a kernel of {len(Z)} points", "Train on fewer.")
         L_inverse = whitener(kernel.gram(Z))
         super().__init__(Z, L_inverse, L_inverse.T @ (L_inverse @ X), kernel)
