@@ -29,7 +29,7 @@ def mapping() -> Iterator[None]:
         raise NumericalError(UNFIT) from error
 
 
-def require_finite(prediction: FloatArray) -> None:
-    """Refuse a prediction with NaN or infinity, with a `NumericalError`."""
-    if not np.isfinite(prediction).all():
+def require_finite(*predicted: FloatArray | None) -> None:
+    """Refuse what was predicted where it holds NaN or infinity, with a `NumericalError`."""
+    if not all(array is None or np.isfinite(array).all() for array in predicted):
         raise NumericalError(UNFIT)

@@ -13,7 +13,6 @@ from facert.data.names import fitting_some, nearest
 from facert.data.normalisation import Normalisation
 from facert.errors import InputError
 from facert.preprocess.clean_source import SourceOptions
-from facert.retarget.finite import require_finite
 
 LARGEST = 1e6
 """Beyond, a gain or a limit is a slip of the pen."""
@@ -138,10 +137,9 @@ class PoseScale:
         self._stretch()
 
     def params(self, Y: FloatArray) -> FloatArray:
-        """Values of the controls from normalised poses, (T, P) or (P,); finite, or an error."""
+        """Values of the controls from normalised poses, (T, P) or (P,)."""
         params = Y * self._scale
         params += self._offset
-        require_finite(params)
         np.maximum(params, self._low, out=params)
         np.minimum(params, self._high, out=params)
         return params
@@ -158,11 +156,7 @@ class PoseScale:
 
     def std(self, std: FloatArray | None) -> FloatArray | None:
         """Standard deviation of poses from that of normalised ones, (T, P) or (P,)."""
-        if std is None:
-            return None
-        scaled = std * self._std_scale
-        require_finite(scaled)
-        return scaled
+        return None if std is None else std * self._std_scale
 
 
 def _number(name: str, table: Mapping[str, Any], entry: str, low: float, high: float) -> float:

@@ -23,7 +23,7 @@ from facert.preprocess.clean_source import clean_source
 from facert.preprocess.motion.estimate import FEWEST
 from facert.preprocess.motion.series import even_grid
 from facert.preprocess.source_layout import SourceColumns
-from facert.retarget.finite import mapping
+from facert.retarget.finite import mapping, require_finite
 from facert.retarget.model import TrainedModel
 from facert.retarget.model_file import read_model, write_model
 from facert.retarget.novelty import novelty_warning
@@ -123,12 +123,10 @@ class Retargeter(TrainedModel):
         if len(predicted.X) >= FEWEST:  # shares of single frames mean nothing
             self._warn_of_novelty(predicted.X)
         scale = PoseScale(self.target_units, self.bounds, adjust)
-        return self._performance(
-            take,
-            found.source.with_matrix(self.source_units.undo(predicted.X), found.std),
-            scale.params(predicted.Y),
-            scale.std(predicted.std),
-        )
+        params, std = scale.params(predicted.Y), scale.std(predicted.std)
+        require_finite(predicted.Y, params, std)
+        source = found.source.with_matrix(self.source_units.undo(predicted.X), found.std)
+        return self._performance(take, source, params, std)
 
     def _one_by_one(self, take: Take, options: RetargetOptions) -> Take:
         """Map one frame after the other, as they would come live."""

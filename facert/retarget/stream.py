@@ -17,7 +17,7 @@ from facert.preprocess.motion.estimate import LEAST_NOISE
 from facert.preprocess.motion.filtering import MotionFilter, NoiseMeter, Seen
 from facert.preprocess.neutral import Calibration
 from facert.preprocess.source_layout import SourceColumns
-from facert.retarget.finite import mapping
+from facert.retarget.finite import mapping, require_finite
 from facert.retarget.model import TrainedModel
 from facert.retarget.options import Adjustments, PoseScale, RetargetOptions
 
@@ -175,7 +175,9 @@ class RetargetStream:
         if self._rough is not None:
             measured = frame if seen is None else np.where(seen, frame, clean)
             Y = self._adjustments.mixed(Y, self._rough.step(measured[None], input_variance).Y)
-        return Streamed(self._scale.params(Y[0]), lambda: self._completed(predicted))
+        params = self._scale.params(Y[0])
+        require_finite(Y, params)
+        return Streamed(params, lambda: self._completed(predicted))
 
     def _checked(self, values: FloatArray) -> FloatArray:
         """A frame as an array; raises InputError when it is not one."""
@@ -228,6 +230,7 @@ class RetargetStream:
         with mapping():
             source = self._model.source_units.undo(predicted.X[0])
             std = None if predicted.std is None else self._scale.std(predicted.std[0])
+            require_finite(std)
             return std, source.reshape(self._cleaned_shape)
 
 
