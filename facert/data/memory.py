@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+from functools import cached_property
 from pathlib import Path
 
 from facert.data.free_memory import free_memory
@@ -106,8 +107,7 @@ def require_memory(size: int, field: str, fix: str = "") -> None:
 
     Raises `InputError` that names the field.
     """
-    if size > LEAST // 8:  # to ask the system takes longer than what is as small
-        _Limit(MOST).require(size, field, fix)
+    _Limit(MOST).require(size, field, fix)
 
 
 def readable(size: int) -> str:
@@ -127,10 +127,15 @@ class _Limit:
 
     def __init__(self, default: int) -> None:
         self._allowed = max_memory() or default
+
+    @cached_property
+    def _free(self) -> int:
         free = free_memory()
-        self._free = self._allowed if free is None else free // _sharing
+        return self._allowed if free is None else free // _sharing
 
     def require(self, size: int, field: str, fix: str = "") -> None:
+        if size <= min(self._allowed, LEAST // 8):
+            return  # to ask the system what is free takes longer than what is as small
         if size <= min(self._allowed, self._free):
             return
         if self._free < self._allowed:
