@@ -2,8 +2,8 @@
 
 Names, units, figures and the names of files come from elsewhere. Whatever they hold is shown as
 text: `printable` and `printable_lines` for a terminal or a picture, `for_html` and `for_svg` for a
-page, `for_mathtext` for a label of matplotlib, `for_json` for JSON that people read, and `for_csv`
-for a cell of a table, from which `from_csv` brings it back.
+page, `for_mathtext` for a label of matplotlib, `for_json` for JSON that people read, `for_shell`
+for a command to copy, and `for_csv` for a cell of a table, from which `from_csv` brings it back.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import html
 import json
 import math
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
 from facert.errors import escaped
@@ -107,6 +108,15 @@ def from_csv(cell: str) -> str:
     ('=1+1', "'quoted'")
     """
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
+
+def for_shell(name: str) -> str:
+    """The name of a file as a shell takes it, for commands to copy; never taken for an option.
+
+    >>> for_shell("my take.h5"), for_shell("-o.h5")
+    ("'my take.h5'", './-o.h5')
+    """
+    return shlex.quote(f"./{name}" if name.startswith("-") else name)
 
 
 def did_you_mean(name: str, among: Iterable[str], otherwise: str = "Choose one of these.") -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from shlex import quote
 from typing import Literal, get_args
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray, frozen
+from facert.data.text import for_shell
 
 Level = Literal["good", "look at it", "bad"]
 LEVELS: tuple[Level, ...] = get_args(Level)
@@ -50,7 +50,7 @@ class Reason:
 
     def cure_for(self, take: str, model: str) -> str:
         """The cure with the names of the files, as a shell takes them."""
-        words = {"TAKE": quote(take), "MODEL": quote(model)}
+        words = {"TAKE": for_shell(take), "MODEL": for_shell(model)}
         return " ".join(words.get(word, word) for word in self.cure.split(" "))
 
 

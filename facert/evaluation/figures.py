@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from facert.data.text import printable
 from facert.evaluation.table import EvaluationRow
+from facert.render.texts import with_plain_texts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +24,7 @@ COLOURS = (
     *("#8c564b", "#8a8a8a", "#7048c0"),
 )
 MARKERS = "osD^vP*Xhd"
+LETTERS = 32  # of a name: longer ones would leave no room for the curves
 ASIDE = 0.025  # of the extent
 
 Axis = Literal["labels", "unlabelled"]
@@ -69,7 +72,7 @@ def plot_errors(rows: Sequence[EvaluationRow], title: str = "") -> Figure:
     grid[0].set_ylabel("RMS over controls", color=INK)
     _legend(figure, grid[0], parts[0])
     figure.suptitle(title, color=INK, fontsize=11)
-    return figure
+    return with_plain_texts(figure)
 
 
 def panels(rows: Sequence[EvaluationRow]) -> list[Panel]:
@@ -103,7 +106,7 @@ def _draw_curve(axes: Axes, part: Panel, method: str, index: int, aside: float) 
         linewidth=1.3,
         elinewidth=0.8,
         capsize=2,
-        label=method,
+        label=printable(method, LETTERS),
     )
 
 
@@ -120,7 +123,8 @@ def _tidy(axes: Axes, part: Panel) -> None:
 def _legend(figure: Figure, axes: Axes, part: Panel) -> None:
     """Methods in the order of the curves' right ends, highest first."""
     last = max(getattr(row, part.axis) for row in part.rows)
-    ends = {row.method: row.rms or 0.0 for row in part.rows if getattr(row, part.axis) == last}
+    rows = [row for row in part.rows if getattr(row, part.axis) == last]
+    ends = {printable(row.method, LETTERS): row.rms or 0.0 for row in rows}
     handles, names = axes.get_legend_handles_labels()
     order = sorted(range(len(names)), key=lambda i: -ends.get(names[i], 0.0))
     figure.legend(

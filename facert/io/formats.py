@@ -13,7 +13,7 @@ from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig, require_extent
 from facert.data.take import Take
-from facert.data.text import plural
+from facert.data.text import for_shell, plural
 from facert.errors import InputError, reading
 from facert.io.guarded import existing_file
 from facert.io.registry import (
@@ -247,7 +247,7 @@ def _warn_of_loss(take: Take, path: Path) -> None:
     """Warn of a file of poses alone that is to hold a few: read again, it would be a source."""
     if not 0 < len(take.labels) < len(take):
         return
-    back = f"facert convert RECORDING OUT.h5 --poses {path.name} brings both together"
+    back = f"facert convert RECORDING OUT.h5 --poses {for_shell(path.name)} brings both together"
     if path.name.lower().endswith(".livelink.csv"):  # the rest of its rows are dropped when read
         back = "only a .csv, .json or .h5 keeps which frames they belong to"
     poses = plural(len(take.labels), "pose")

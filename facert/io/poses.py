@@ -17,7 +17,7 @@ from facert.data.rate import frames_shown, standard_rate
 from facert.data.resampling import counted_at
 from facert.data.rig import Rig
 from facert.data.take import Take
-from facert.data.text import plural
+from facert.data.text import for_shell, plural
 from facert.errors import InputError, reading
 from facert.io.formats import read_any, require_take
 from facert.io.lines import read_csv, read_header
@@ -113,7 +113,8 @@ def _set_by_somebody(take: Take, path: Path) -> Take:
         fix = (
             "Give the poses that were set; to take these nonetheless, make a table of them first: "
         )
-        table = f"facert convert {path.name} {path.stem}.csv."
+        made = for_shell(f"{path.stem}.csv")
+        table = f"facert convert {for_shell(path.name)} {made}."
         raise InputError("/target/std", "poses that somebody set", found, fix + table)
     if predicted:
         poses = plural(predicted, "predicted pose")

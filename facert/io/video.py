@@ -83,7 +83,17 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
     rate = str(Fraction(fps).limit_denominator())
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", rate)
     coded = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", _QUALITY)
-    command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, str(path))
+    command = (
+        get_ffmpeg_exe(),
+        "-v",
+        "error",
+        "-y",
+        *raw,
+        "-i",
+        "-",
+        *coded,
+        f"file:{path.absolute()}",
+    )
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
     ) as process:

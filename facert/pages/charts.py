@@ -8,6 +8,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
+from facert.errors import escaped
 from facert.render.faces import INK
 from facert.render.plots import CURVE, TRUTH
 
@@ -84,7 +85,7 @@ class Chart:
         return server.gui.add_uplot(
             (self._time[self._frames], *self._curves, np.full(len(self._frames), np.nan)),
             (u.Series(label="s"), *(styles.get(curve, faint) for curve in curves), marked),
-            title=name,
+            title=escaped(name),
             scales={"x": u.Scale(time=False, auto=True), "y": u.Scale(range=self._range())},
             axes=(u.Axis(**axis), u.Axis(**(axis | {"size": 38}))),  # type: ignore[typeddict-item]
             legend=u.Legend(show=False),

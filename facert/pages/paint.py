@@ -7,12 +7,12 @@ of a few colours (its paint), and those of the same colour are a mesh.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.rig import CLAY, Mesh
+from facert.data.text import for_html
 
 MOST = 24  # colours of a face
 LEVELS = 10  # of a scale
@@ -71,7 +71,7 @@ class Scale:
         return (
             f'<div style="padding:2px 12px 6px;font-size:12px"><div style="display:flex">{blocks}'
             f'</div><div style="display:flex;justify-content:space-between">{ends} '
-            f"{escape(self.units)}</span></div></div>"
+            f"{for_html(self.units)}</span></div></div>"
         )
 
     @classmethod

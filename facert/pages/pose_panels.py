@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from viser import Icon
 
 from facert.data.corrections import WIDTH
+from facert.errors import escaped
 from facert.pages.pose_editor import PoseEditor, slider_bounds
 from facert.pages.pose_stage import SAMPLES
 from facert.pages.posed_take import Label
@@ -152,7 +153,7 @@ class PosePanel:
         self._other_side.visible = one_sided is not None
         if one_sided is not None:
             other = names[editor.counterparts[one_sided]]
-            self._other_side.label = f"{other} as {names[one_sided]}"
+            self._other_side.label = escaped(f"{other} as {names[one_sided]}")
 
     def show_label(self, blends: bool, width: float, label: Label | None) -> None:
         """Show the frame's label, if it has one, and whether and how long it is blended."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol
 
+from facert.errors import escaped
 from facert.pages.session import PosingSession
 from facert.pages.widgets import ButtonList, PlayControls, Text, Timeline
 
@@ -40,7 +41,7 @@ class TakePanel:
         assert session.take is not None  # the caller has looked
         self._session = session
         names = [part.name for part in session.parts]
-        self._choices = [f"{number}  {name}" for number, name in enumerate(names, 1)]
+        self._choices = [escaped(f"{number}  {name}") for number, name in enumerate(names, 1)]
         self._choice = server.gui.add_dropdown("take", self._choices, visible=len(names) > 1)
         self._timeline = Timeline(server, session.take, page)
         self._suggested: ButtonList[Place] = ButtonList(server, "Pose next", page.go_to)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.errors import escaped
 from facert.io.video_frames import VideoFrames
 from facert.pages.charts import Chart
 from facert.pages.keys import add_play_keys
@@ -102,13 +103,14 @@ class ViewPage(PlayedPage):
             return
         names = take.controls.names
         with self._server.gui.add_folder("Curves"):
-            chosen = self._server.gui.add_dropdown("show or hide", ("", *names))
+            choices = ("", *map(escaped, names))
+            chosen = self._server.gui.add_dropdown("show or hide", choices)
             self._curves = self._server.gui.add_folder(None)
 
         @chosen.on_update
         def _(_: object) -> None:
             if chosen.value:
-                control = names.index(chosen.value)
+                control = choices.index(chosen.value) - 1
                 chosen.value = ""  # type: ignore[misc]
                 self.worker.do(("curve", control), lambda: self._toggle_curve(control))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from html import escape
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -12,7 +11,9 @@ from viser import Icon, IconName
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.names import control_groups
 from facert.data.take import Take
+from facert.data.text import for_html
 from facert.data.timecode import timecode
+from facert.errors import escaped
 from facert.pages.worker import Playback
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class Sliders:
         groups = control_groups(names)
         unfolded = unfolded_groups(groups)
         for group, members in groups.items():
-            with server.gui.add_folder(group, expand_by_default=group in unfolded):
+            with server.gui.add_folder(escaped(group), expand_by_default=group in unfolded):
                 for control in members.tolist():
                     self._handles[control] = self._add(server, control)
 
@@ -69,7 +70,7 @@ class Sliders:
         for control, handle in self._handles.items():
             low, high = self._bounds[control]
             value = float(np.clip(np.round(pose[control] / handle.step) * handle.step, low, high))
-            label = PIN * (control in pins) + self._names[control]
+            label = PIN * (control in pins) + escaped(self._names[control])
             if abs(handle.value - value) > handle.step / 2:
                 handle.value = value  # type: ignore[misc]
             if handle.label != label:
@@ -80,7 +81,7 @@ class Sliders:
         high = max(high, low + 1e-6)
         step = float(10.0 ** np.floor(np.log10(high - low)) / FINE)
         handle = server.gui.add_slider(
-            self._names[control], low, high, step, float(np.clip(0.0, low, high))
+            escaped(self._names[control]), low, high, step, float(np.clip(0.0, low, high))
         )
 
         @handle.on_update
@@ -127,7 +128,7 @@ class ButtonList(Generic[Key]):
         while len(self._buttons) < len(labels):
             self._buttons.append(self._add(len(self._buttons)))
         self._keys = list(labels)
-        texts = [*labels.values(), *[""] * (len(self._buttons) - len(labels))]
+        texts = [*map(escaped, labels.values()), *[""] * (len(self._buttons) - len(labels))]
         for button, text in zip(self._buttons, texts, strict=True):
             if button.label != text:
                 button.label = text
@@ -159,7 +160,7 @@ class Text:
 
     def write(self, text: str) -> None:
         """Show a text; each of its lines is one."""
-        lines = "<br>".join(escape(line) for line in text.splitlines())
+        lines = "<br>".join(map(for_html, text.splitlines()))
         self._html.content = f'<div style="padding:4px 12px;font-size:13px">{lines}</div>'
 
 
@@ -229,7 +230,7 @@ class Timeline:
         seconds = float(self._take.time[frame])
         code = timecode(self._take.start_timecode, seconds, self._take.fps)
         posed = " · <b>key pose</b>" if frame in self._key_poses else ""
-        text = f"frame {frame} of {len(self._take)} · {seconds:.2f} s {escape(code)}{posed}"
+        text = f"frame {frame} of {len(self._take)} · {seconds:.2f} s {for_html(code)}{posed}"
         self._moment.content = f'<div style="padding:6px 12px 0;font-size:13px">{text}</div>'
 
     def _slid(self, event: GuiEvent[GuiSliderHandle[int]]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from shlex import quote
 
 import numpy as np
 
@@ -208,12 +209,12 @@ def _warn_of_slips(labels: _Labels, seen: BoolArray) -> None:
     for control in np.flatnonzero(outside.any(axis=0))[:NAMED].tolist():
         row, (low, high) = int(outside[:, control].argmax()), labels.limits[control]
         value = labels.values[row, control]
-        wider = f"{min(low, value):.3g}..{max(high, value):.3g}"
+        wider = f"{labels.names[control]}={min(low, value):.3g}..{max(high, value):.3g}"
         log.warning(
             "the pose of frame %s has %s at %.3g, beyond its limits %g..%g, to which predictions "
-            "are clipped: correct it, or facert convert --limits '%s=%s'",
+            "are clipped: correct it, or facert convert --limits %s",
             *(labels.frames[row], labels.names[control], value, low, high),
-            *(labels.names[control], wider),
+            quote(wider) if "'" in wider else f"'{wider}'",
         )
 
 

@@ -14,6 +14,7 @@ from facert.data.take import Take
 from facert.data.text import printable
 from facert.errors import InputError
 from facert.render.faces import INK, require_poses
+from facert.render.texts import with_plain_texts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +68,7 @@ def plot_controls(take: Take, truth: Take | None = None, names: Sequence[str] = 
     if truth is not None or take.std is not None:
         shown = grid[0].get_legend_handles_labels()
         figure.legend(*shown, loc="outside upper right", ncols=3, frameon=False, fontsize=8)
-    return figure
+    return with_plain_texts(figure)
 
 
 def _number_frames(axes: Axes, take: Take) -> None:

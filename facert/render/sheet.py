@@ -23,6 +23,7 @@ from facert.render.faces import (
     require_same_length,
 )
 from facert.render.shade import Camera, frame_mesh, shade
+from facert.render.texts import with_plain_texts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +93,7 @@ def render_sheet(
         _label(line[0], face.label)
     for axes in grid.flat:
         axes.set_axis_off()
-    return figure
+    return with_plain_texts(figure)
 
 
 def contact_sheet(
@@ -143,7 +144,7 @@ def contact_sheet(
         axes.set_title(heading, fontsize=9, color=INK, pad=3)
     style = {"fontsize": 7, "color": INK, "va": "bottom", "wrap": True}
     figure.text(0.06 / (CELL * width), 0.05 / inches, "; ".join(text for text, _ in layers), style)
-    return figure
+    return with_plain_texts(figure)
 
 
 def _contact_layers(
@@ -197,7 +198,7 @@ def draw_points(mesh: Mesh, vertices: IntArray) -> Figure:
                 color=_POINT,
             )
         axes.set_axis_off()
-    return figure
+    return with_plain_texts(figure)
 
 
 def checked_frames(frames: Sequence[int], length: int) -> list[int]:

@@ -13,7 +13,7 @@ from facert.cli.shared import console
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import DEFAULT_MODEL, OVERWRITE, argument, file_option, option
 from facert.cli.shared.set_controls import parse_controls
-from facert.data.text import plural, printable
+from facert.data.text import for_shell, plural, printable
 from facert.errors import InputError, reading
 from facert.io.registry import OWN_ENDINGS, require_replaceable
 
@@ -251,7 +251,7 @@ def _write(take: Take, made: Take, path: Path, output: Path) -> None:
     count = 0 if made.corrections is None else len(made.corrections.frames)
     if count:
         text = "%s holds %s: facert train TAKE %s learns from what was corrected"
-        console.log.info(text, output.name, plural(count, "correction"), output.name)
+        console.log.info(text, output.name, plural(count, "correction"), for_shell(output.name))
 
 
 def _changed(take: Take, made: Take) -> list[int]:

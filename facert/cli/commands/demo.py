@@ -7,6 +7,7 @@ from typing import Annotated
 
 from facert.cli.shared import console
 from facert.cli.shared.options import OVERWRITE, SEED, argument
+from facert.data.text import for_shell
 
 
 def command(
@@ -25,9 +26,11 @@ def command(
 
     for path in write_demo(folder, seed, overwrite):
         console.show(f"{path}  {path.stat().st_size / 1000:.0f} kB")
-    model = folder / "model.safetensors"
+
+    def at(name: str) -> str:
+        return for_shell(str(folder / name))
+
+    model = at("model.safetensors")
     console.out.print("Next:", style="bold")
-    console.show(f"  facert train {folder / 'training.h5'} -o {model}")
-    console.show(
-        f"  facert retarget {folder / 'performance.h5'} {folder / 'retargeted.h5'} --model {model}"
-    )
+    console.show(f"  facert train {at('training.h5')} -o {model}")
+    console.show(f"  facert retarget {at('performance.h5')} {at('retargeted.h5')} --model {model}")

@@ -182,11 +182,10 @@ def write_beside(take: Take, output: Path, overwrite: bool, beside: Beside) -> N
 
 def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
     """Write a figure in the format of the file's ending."""
-    from facert.render.texts import take_texts_as_they_are
+    from facert.render.texts import with_plain_texts
 
-    take_texts_as_they_are(figure)
     content = io.BytesIO()
-    figure.savefig(content, format=path.suffix[1:].lower())
+    with_plain_texts(figure).savefig(content, format=path.suffix[1:].lower())
     write_bytes(content.getvalue(), path, overwrite)
 
 

@@ -19,7 +19,7 @@ from facert.cli.shared.files import (
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.interrupt import wait_for_end
 from facert.cli.shared.options import DEFAULT_MODEL
-from facert.data.text import listed, plural
+from facert.data.text import for_shell, listed, plural
 from facert.errors import reading
 
 if TYPE_CHECKING:
@@ -121,7 +121,9 @@ def _require_output(output: Path, overwrite: bool) -> None:
     require_name(output, True, OWN_ENDINGS)
     for path in (output, output.with_suffix(".safetensors")):
         if path.exists() and not overwrite and not is_foreign(path):
-            console.log.info("to go on from its poses: --take %s --overwrite", output)
+            console.log.info(
+                "to go on from its poses: --take %s --overwrite", for_shell(str(output))
+            )
         require_replaceable(path, overwrite)
 
 

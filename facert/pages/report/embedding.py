@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from facert.pages.report.sections import Picture
-from facert.render.texts import take_texts_as_they_are
+from facert.render.texts import with_plain_texts
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -26,7 +26,7 @@ def embedded(figure: Figure, caption: str, form: Literal["svg", "png"]) -> Pictu
     """
     import matplotlib
 
-    take_texts_as_they_are(figure)
+    with_plain_texts(figure)
     for artist in figure.findobj():
         _simplify(artist)
     options: dict[str, Any] = {"metadata": {"Date": None}} if form == "svg" else {}

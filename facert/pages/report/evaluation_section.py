@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
 
-from facert.data.text import plural
+from facert.data.text import plural, printable
 from facert.errors import InputError, reading
-from facert.evaluation.figures import INK, plot_errors
+from facert.evaluation.figures import INK, LETTERS, plot_errors
 from facert.evaluation.table import EvaluationRow, columns_of, sections_of
 from facert.io.guarded import existing_file, read_text
 from facert.pages.report.embedding import embedded
@@ -52,7 +52,9 @@ def _section(name: str, settings: Mapping[str, Any], rows: list[EvaluationRow]) 
     pictures: list[Picture] = []
     if drawn:
         pictures.append(embedded(plot_errors(drawn), "Error of each method", "svg"))
-        controls = [str(control) for control in _sequence(settings.get("controls"))]
+        controls = [
+            printable(str(control), LETTERS) for control in _sequence(settings.get("controls"))
+        ]
         most = max(row.labels for row in drawn)
         picture = _per_control([row for row in drawn if row.labels == most], controls)
         if picture is not None:
@@ -96,7 +98,8 @@ def _per_control(rows: Sequence[EvaluationRow], controls: Sequence[str]) -> Figu
     axes = figure.subplots()
     image = axes.imshow(np.array(errors), cmap="YlOrRd", vmin=0.0, aspect="auto")
     axes.set_xticks(range(len(controls)), controls, rotation=90, fontsize=7, color=INK)
-    axes.set_yticks(range(len(methods)), methods, fontsize=8, color=INK)
+    names = [printable(method, LETTERS) for method in methods]
+    axes.set_yticks(range(len(methods)), names, fontsize=8, color=INK)
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01).ax.tick_params(labelsize=7)

@@ -8,6 +8,7 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined, Template
 
+from facert.data.text import printable_lines
 from facert.data.verdict import LEVELS
 from facert.pages.report.comparison_section import comparison_section
 from facert.pages.report.judged import summary_section, worst_first
@@ -32,6 +33,15 @@ def to_html(report: ReportPage) -> str:
 def _template() -> Template:
     text = files("facert.pages.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_printable,
     )
     return environment.from_string(text)
+
+
+def _printable(value: object) -> object:
+    """A text as a page can hold it: no control characters, no reversed writing."""
+    return printable_lines(value) if isinstance(value, str) else value
