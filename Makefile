@@ -10,12 +10,16 @@ DEMO ?= build/demo
 # How long `make fuzz` takes, over all targets.
 MINUTES ?= 10
 
-.PHONY: demo test check format docs bench figures acceptance mutants fuzz clean
+.PHONY: demo test kernels lowest test-lowest check format docs bench figures acceptance mutants fuzz clean
 
-$(VENV)/.installed: pyproject.toml constraints.txt
+# Versions of dependencies, and which extra is installed.
+CONSTRAINTS ?= constraints.txt
+EXTRA ?= dev
+
+$(VENV)/.installed: pyproject.toml $(CONSTRAINTS)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) torch
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) --editable '.[$(EXTRA)]'
 	touch $@
 
 demo: $(VENV)/.installed
@@ -28,6 +32,25 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# Where linear algebra decides: these pass with the kernels of any processor, by one thread and two.
+NUMERICAL := $(addprefix tests/,models methods preprocess topology retarget regions mesh posing)
+KERNELS = $(BIN)/python -m experiments.reliability.processors
+PYTEST = $(BIN)/python -m pytest -n 2 --dist worksteal
+
+kernels: $(VENV)/.installed
+	$(KERNELS) --only avx2,sse,old --threads 1 -- $(PYTEST) $(NUMERICAL)
+	$(KERNELS) --only avx512,avx2,sse --threads 2 -- $(PYTEST) -m 'not real' $(NUMERICAL)
+
+# The same with the lowest versions that pyproject.toml allows. Torch is the one of constraints.txt:
+# others are several gigabytes.
+lowest:
+	mkdir -p build
+	$(PYTHON) .ci/lowest.py --but torch > build/constraints-lowest.txt
+	$(MAKE) test-lowest VENV=.venv-lowest CONSTRAINTS=build/constraints-lowest.txt EXTRA=test
+
+test-lowest: $(VENV)/.installed
+	$(KERNELS) --only avx2 -- $(PYTEST) -m 'not real' $(NUMERICAL) tests/data tests/io
 
 check: $(VENV)/.installed
 	$(BIN)/ruff format --check .

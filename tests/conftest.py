@@ -13,8 +13,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from facert.data.take import Controls, Source, Take
+
+# How long an example takes depends on the machine and on what else it does.
+settings.register_profile("facert", deadline=None)
+settings.load_profile("facert")
 
 DEFAULT_DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
