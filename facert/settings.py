@@ -113,8 +113,11 @@ class Settings:
     ] = 1e-6
     max_iterations: Annotated[int, About("Iterations at most.", FINE, 1)] = 2000
     checkpoint_every: Annotated[
-        int, About("Iterations between checkpoints, at which L-BFGS begins anew.", FINE, 1)
+        int, About("Iterations between stages, at which L-BFGS begins anew.", FINE, 1)
     ] = 500
+    checkpoint_seconds: Annotated[
+        float, About("Seconds between checkpoints, from which --resume continues.", FINE, 0)
+    ] = 10.0
     device: Annotated[str, About("Where the shared models are trained: cpu or cuda.")] = "cpu"
     regions: Annotated[
         Regions | str | None,

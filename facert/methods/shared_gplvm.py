@@ -13,6 +13,7 @@ import logging
 import math
 from collections.abc import Iterator, Mapping
 from copy import copy
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Literal, Self
 
@@ -65,6 +66,14 @@ OPTIMISERS: dict[OptimiserName, type[LBFGS] | type[SCG]] = {"lbfgs": LBFGS, "scg
 
 
 ChosenLikelihood = Literal["exact", ApproximationName]
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What identifies a training run, and who watches it."""
+
+    fingerprint: str
+    monitor: Monitor
 
 
 class SemiSupervisedSGPLVM:
@@ -121,9 +130,9 @@ class SemiSupervisedSGPLVM:
         likelihood = self._likelihood(X, Y, count)
         sparse = likelihood != "exact"
         with threads_for(self.settings.inducing if sparse else len(X) + len(Y) - count):
-            module = self._module(X, Y, count, likelihood).to(device)
-            fingerprint = _fingerprint(X, Y, self.settings)
-            result = self._train(module, fingerprint, monitor or Monitor())
+            run = _Run(_fingerprint(X, Y, self.settings), monitor or Monitor())
+            module = self._module(X, Y, count, likelihood, run).to(device)
+            result = self._train(module, run)
             self._set_views(*module.posteriors())
         residual = self.predict(labelled.X).Y - labelled.Y
         errors = {"training reconstruction": rms(residual)}
@@ -200,7 +209,7 @@ class SemiSupervisedSGPLVM:
         return Prediction(mean, std, mapped.x)
 
     def _module(
-        self, X: FloatArray, Y: FloatArray, labelled: int, likelihood: ChosenLikelihood
+        self, X: FloatArray, Y: FloatArray, labelled: int, likelihood: ChosenLikelihood, run: _Run
     ) -> SharedGPLVM:
         """Build the model to be trained, at its initial parameters.
 
@@ -213,7 +222,7 @@ class SemiSupervisedSGPLVM:
             self._begin = None
         begin = self._begin
         if begin is None and likelihood != "exact":
-            begin = self._trained_core(X, Y, labelled)
+            begin = self._trained_core(X, Y, labelled, run)
         M = None
         if not self.supervised:
             M = constraint_matrix(X, Y, labelled, self.settings.neighbours)  # Eq. (6)
@@ -243,11 +252,13 @@ class SemiSupervisedSGPLVM:
                 inducing = Z[view[1][inducing_rows(len(view[1]), labelled, self.settings.inducing)]]
                 yield SparseView(*view, inducing, row_weights(len(view[1]), labelled), chosen)
 
-    def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int) -> TrainedViews:
+    def _trained_core(self, X: FloatArray, Y: FloatArray, labelled: int, run: _Run) -> TrainedViews:
         core = Core.of(X, Y, labelled)
         X, Y = X[core.rows_x], Y[core.rows_y]
-        small = self._module(X, Y, core.labelled, "exact").to(find_device(self.settings.device))
-        if self._train(small, "", Monitor()).status == "interrupted":  # there is no model to keep
+        small = self._module(X, Y, core.labelled, "exact", run)
+        small = small.to(find_device(self.settings.device))
+        phase = replace(run, fingerprint=f"{run.fingerprint}:core")
+        if self._train(small, phase).status == "interrupted":  # there is no model to keep
             raise KeyboardInterrupt
         return TrainedViews.at(*small.posteriors())
 
@@ -263,15 +274,16 @@ class SemiSupervisedSGPLVM:
             log.warning("%d points carry only %d latent dimensions", points, latent_dim)
         return latent_dim
 
-    def _train(self, module: SharedGPLVM, fingerprint: str, monitor: Monitor) -> Result:
+    def _train(self, module: SharedGPLVM, run: _Run) -> Result:
         return train(
             module,
             OPTIMISERS[self.settings.optimizer](),
             tolerance=self.settings.tolerance * (SOONER if self._begin else 1.0),
             max_iterations=self.settings.max_iterations,
             checkpoint_every=self.settings.checkpoint_every,
-            fingerprint=fingerprint,
-            monitor=monitor,
+            checkpoint_seconds=self.settings.checkpoint_seconds,
+            fingerprint=run.fingerprint,
+            monitor=run.monitor,
             magnitude=float(module.entries),
         )
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -15,23 +17,30 @@ from facert.data.arrays import FloatArray
 from facert.errors import InputError
 from facert.io.atomic import Appended, write_text
 from facert.io.guarded import read_text
+from facert.io.journal import source_digest
 from facert.io.registry import require_replaceable
 from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import read_tensors, write_tensors
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State
+from facert.retarget.model_file import library_versions
 
 log = logging.getLogger(__name__)
 
 FORMAT = "facert-checkpoint"
 _MEMORY = "memory."
+_MEMORIES: tuple[set[str], ...] = (
+    {"gradient", "direction", "scalars"},  # of scaled conjugate gradients
+    {"begin", "scalars", "values", "gradients"},  # of L-BFGS within a stage
+)
 
 
 @dataclass(frozen=True)
 class CheckpointMetadata:
     """What a checkpoint says beside its arrays."""
 
-    fingerprint: str  # Of the data and the settings
+    fingerprint: str  # Of the data and the settings, and the phase of the training
+    program: str = ""  # Of the code and the libraries
 
 
 def checkpoint_path(model: Path) -> Path:
@@ -64,7 +73,7 @@ class CheckpointFile(Monitor):
         self._fingerprint = ""
 
     def resume(self, fingerprint: str) -> Progress | None:
-        """The file's progress, None when there is no file.
+        """The file's progress; None when there is no file, or one of another program or phase.
 
         Raises
         ------
@@ -78,7 +87,10 @@ class CheckpointFile(Monitor):
             log.warning("no checkpoint %s: training begins anew", self.path)
             return None
         arrays, metadata = read_tensors(self.path, FORMAT, CheckpointMetadata, _check_shapes)
-        if metadata.fingerprint != fingerprint:
+        if metadata.program != _program():
+            log.warning("%s is of another version of facert: training begins anew", self.path)
+            return None
+        if metadata.fingerprint.partition(":")[0] != fingerprint.partition(":")[0]:
             raise InputError(
                 "fingerprint",
                 "a checkpoint of the same take and settings",
@@ -86,7 +98,8 @@ class CheckpointFile(Monitor):
                 "Give the options of that run, or train without --resume.",
                 str(self.path),
             )
-        return _progress(arrays)
+        # Else this phase of the training is over, or is yet to come.
+        return _progress(arrays) if metadata.fingerprint == fingerprint else None
 
     def checkpoint(self, progress: Progress) -> None:
         """Write the progress, replacing the last."""
@@ -97,7 +110,7 @@ class CheckpointFile(Monitor):
             "scalars": np.array([state.value, state.gradient_norm, float(state.iterations)]),
             **{_MEMORY + name: array for name, array in state.memory.items()},
         }
-        metadata = CheckpointMetadata(self._fingerprint)
+        metadata = CheckpointMetadata(self._fingerprint, _program())
         write_tensors(self.path, arrays, metadata, FORMAT, overwrite=True)
 
     def remove(self) -> None:
@@ -126,23 +139,38 @@ class CurveLog(Monitor):
     def __init__(self, path: Path, overwrite: bool, goes_on: bool = False) -> None:
         require_replaceable(path, overwrite or goes_on)
         self.path = path
-        self._goes_on = goes_on and path.exists()
+        self._goes_on, self._is_on = goes_on and path.exists(), True
         self._began = time.perf_counter()
 
-    def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  only begins the file
-        """Begin the file: training is about to start. A line that a killed run cut off goes."""
-        lines = read_text(self.path).splitlines(keepends=True) if self._goes_on else []
-        whole = "".join(line for line in lines if line.endswith("\n"))
-        write_text(whole or f"{CURVE}\n", self.path, overwrite=True)
+    def resume(self, fingerprint: str) -> Progress | None:
+        """Begin the file: training is about to start, or a phase of it, which has no line here."""
+        self._is_on = ":" not in fingerprint
+        if self._is_on and not self._goes_on:
+            self._write([])
         return None
 
     def iteration(self, state: State) -> None:
         """Append the line of an iteration."""
+        if not self._is_on:
+            return
+        if self._goes_on:
+            self._write(self._lines_before(state.iterations))
+            self._goes_on = False
         seconds = time.perf_counter() - self._began
         # Closed after each line: the log can be followed, and survives a killed run.
         line = f"{state.iterations},{state.value!r},{state.gradient_norm!r},{seconds:.6f}\n"
         with Appended(self.path) as file:
             file.add(line.encode())
+
+    def _lines_before(self, iteration: int) -> list[str]:
+        """The lines of the run that goes on: it may have come further than its checkpoint."""
+        whole, _, _ = read_text(self.path).rpartition("\n")  # the last may be cut off
+        lines = whole.splitlines()[1:]
+        here = str(iteration)
+        return list(takewhile(lambda line: line.partition(",")[0] != here, lines))
+
+    def _write(self, lines: Sequence[str]) -> None:
+        write_text("\n".join([CURVE, *lines, ""]), self.path, overwrite=True)
 
 
 class Monitors(Monitor):
@@ -179,13 +207,24 @@ def _check_shapes(declared: Mapping[str, Shaped], metadata: CheckpointMetadata) 
     vectors = {name: len(shape) for name, shape in own.items()}
     if vectors != dict.fromkeys(("x", "curve", "scalars"), 1) or own["scalars"] != (3,):
         raise InputError("the arrays", "x, curve and 3 scalars", ", ".join(own), "Train anew.")
-    for name, memory in part_of(declared, _MEMORY).items():
-        if memory.shape != own["x"] and not (name == "scalars" and memory.shape in ((2,), (3,))):
-            found = f"shape {memory.shape}"
-            raise InputError(_MEMORY + name, f"shape {own['x']}", found, "Train anew.")
+    found = {name: one.shape for name, one in part_of(declared, _MEMORY).items()}
+    rows = found.get("values", ())
+    known = {"begin": own["x"], "values": rows[:1], "gradients": rows[:1] + own["x"]}
+    known |= {"gradient": own["x"], "direction": own["x"], "scalars": found.get("scalars", ())[:1]}
+    complete = set(found) in (set(), *_MEMORIES)
+    if not complete or any(shape != known[name] for name, shape in found.items()):
+        expected = f"the state of a search for {own['x'][0]} numbers"
+        raise InputError(_MEMORY + "...", expected, f"{found}", "Train anew.")
 
 
 def _progress(arrays: Mapping[str, FloatArray]) -> Progress:
     value, gradient_norm, iterations = arrays["scalars"].tolist()
     state = State(arrays["x"], value, gradient_norm, int(iterations), part_of(arrays, _MEMORY))
     return Progress(state, tuple(arrays["curve"].tolist()))
+
+
+@cache
+def _program() -> str:
+    """What computes: a run of other code, or other libraries, would not go on in the same way."""
+    versions = repr(sorted(library_versions().items()))
+    return f"{source_digest(Path(__file__).parents[1])} {versions}"

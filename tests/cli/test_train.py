@@ -12,6 +12,7 @@ import facert as api
 from facert.cli.commands.train import _shown
 from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import write_tensors
+from facert.retarget import checkpoint
 from facert.retarget.checkpoint import CheckpointMetadata, checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
@@ -162,6 +163,32 @@ def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow,
     assert facert(*arguments[:-1], quick, "--resume").code == 0
     assert api.load(model).figures["status"] == "converged"
     assert not checkpoint_path(model).exists()
+
+
+def test_a_run_ended_within_a_stage_resumes_to_the_same_file(facert, make_take, slow, tmp_path):
+    take = tmp_path / "take.h5"
+    api.write_take(make_take(frames=60, animation=40), take)
+    often = tmp_path / "often.toml"
+    often.write_text('method = "ssgplvm"\ncheckpoint_seconds = 0.0\nmax_iterations = 120\n')
+    (tmp_path / "whole").mkdir()
+    ended, whole = tmp_path / "model.safetensors", tmp_path / "whole" / "model.safetensors"
+    arguments = ("train", take, "-o", ended, "--config", often, "--log", tmp_path / "curve.csv")
+    assert stopped_in_training(signal.SIGTERM, arguments, checkpoint_path(ended)) == 143
+    assert api.load(ended).figures["status"] == "interrupted"
+    assert facert(*arguments, "--resume").code == 0
+    assert facert("train", take, "-o", whole, "--config", often).code == 0
+    assert ended.read_bytes() == whole.read_bytes()
+    lines = (tmp_path / "curve.csv").read_text().splitlines()
+    assert [int(line.partition(",")[0]) for line in lines[1:]] == list(range(1, len(lines)))
+
+
+def test_a_checkpoint_of_another_version_is_not_used(facert, take, slow, model, monkeypatch):
+    arguments = ("train", take, "-o", model, "--config", slow)
+    stopped_in_training(signal.SIGKILL, arguments, checkpoint_path(model))
+    monkeypatch.setattr(checkpoint, "_program", lambda: "another")
+    done = facert(*arguments, "--resume")
+    assert done.code == 0
+    assert "is of another version of facert: training begins anew" in done.err
 
 
 def test_a_checkpoint_of_another_take_is_refused(facert, make_take, take, slow, model, tmp_path):

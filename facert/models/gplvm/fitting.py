@@ -22,6 +22,7 @@ def train(
     fingerprint: str,
     monitor: Monitor,
     magnitude: float = 1.0,
+    checkpoint_seconds: float = 10.0,
 ) -> Result:
     """Minimise the module's output; its parameters are then the best that were found.
 
@@ -36,14 +37,16 @@ def train(
     max_iterations : int
         Counted over all resumed runs.
     checkpoint_every : int
-        Iterations between two checkpoints.
+        Iterations of a stage, after which L-BFGS begins anew.
     fingerprint : str
-        Identifies the problem: its data and its settings.
+        Identifies the problem, by its data and its settings; after a colon a phase of the training.
     monitor : Monitor
         Sees every iteration, keeps checkpoints, and has that of an earlier run.
     magnitude : float
         The decrease is taken relative to this at least: an objective that passes through zero is
         no measure of itself.
+    checkpoint_seconds : float
+        Time between two checkpoints; it changes nothing about the result.
 
     Returns
     -------
@@ -61,21 +64,27 @@ def train(
             "Train without --resume.",
         )
 
+    due = began + checkpoint_seconds
+
     def converged() -> bool:
         value = max(abs(progress.state.value), 1.0)
         return progress.converged(tolerance * max(magnitude / value, 1.0))
 
     def watch(state: State) -> bool:
-        nonlocal progress
+        nonlocal progress, due
         progress = Progress(state, (*progress.curve, state.value))
         monitor.iteration(state)
+        if time.perf_counter() >= due:
+            monitor.checkpoint(progress)
+            due = time.perf_counter() + checkpoint_seconds
         return converged()
 
     status: Status = "iteration limit"
     try:
         while progress.state.iterations < max_iterations:
-            left = max_iterations - progress.state.iterations
-            state = optimiser.advance(objective, progress.state, min(checkpoint_every, left), watch)
+            made = progress.state.iterations
+            stage = min(checkpoint_every - made % checkpoint_every, max_iterations - made)
+            state = optimiser.advance(objective, progress.state, stage, watch)
             progress = replace(progress, state=state)
             if converged():
                 status = "converged"

@@ -32,11 +32,14 @@ class Monitor:
     """
 
     def resume(self, fingerprint: str) -> Progress | None:  # noqa: ARG002  a hook
-        """State at which an earlier run with this fingerprint stopped, or None to begin anew."""
+        """State at which an earlier run with this fingerprint stopped, or None to begin anew.
+
+        Called once for each phase of a training, whose name follows the fingerprint after a colon.
+        """
         return None
 
     def iteration(self, state: State) -> None:
         """Called after every iteration."""
 
     def checkpoint(self, progress: Progress) -> None:
-        """Called every so many iterations, and when the run is interrupted."""
+        """Called after every stage, at times within one, and when the run is interrupted."""

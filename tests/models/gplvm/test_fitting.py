@@ -172,3 +172,36 @@ def test_convergence_is_a_small_relative_fall_over_several_iterations(curve, con
     progress = Progress(State(np.zeros(1), curve[-1], 0.0, len(curve)), tuple(curve))
     assert progress.converged(1e-6) is converged
     assert replace(progress, curve=()).converged(1e-6) is False
+
+
+@pytest.mark.parametrize("stop_at", [1, 17, 40, 53])
+def test_a_run_that_was_stopped_anywhere_resumes_bit_by_bit(optimiser, stop_at):
+    options = {**OPTIONS, "max_iterations": 90, "tolerance": 0.0}
+    whole, stopped = make_module(), Recorder(stop_at=stop_at)
+    result = train(whole, optimiser, monitor=Recorder(), **options)
+    train(make_module(), optimiser, monitor=stopped, **options)
+    resumed = make_module()
+    again = train(resumed, optimiser, monitor=Recorder(stopped.saved), **options)
+    assert (again.value, again.iterations) == (result.value, result.iterations)
+    for one, other in zip(whole.parameters(), resumed.parameters(), strict=True):
+        assert torch.equal(one, other)
+
+
+def test_checkpoints_come_by_time_and_change_nothing(optimiser):
+    options = {**OPTIONS, "max_iterations": 60, "tolerance": 0.0}
+    often = Counted()
+    value = train(make_module(), optimiser, monitor=often, checkpoint_seconds=0.0, **options).value
+    assert often.count >= len(often.states)
+    seldom = Counted()
+    assert train(make_module(), optimiser, monitor=seldom, **options).value == value
+    assert seldom.count == 2
+
+
+class Counted(Recorder):
+    """Counts checkpoints as well."""
+
+    count = 0
+
+    def checkpoint(self, progress):
+        super().checkpoint(progress)
+        self.count += 1
