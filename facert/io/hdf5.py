@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.data.memory import LEAST, FileMemory
+from facert.data.memory import FileMemory
 from facert.data.rig import Mesh
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import InputError, reading
@@ -202,8 +202,7 @@ class GuardedFile:
         with self._question(path):
             size = math.prod((dataset.shape or ())[1:]) * (stop - start) * _FLOAT
             size += dataset.unpacked_size(start, stop)
-            if size > LEAST:
-                FileMemory(self._path).require(size, path)
+            FileMemory(self._path).require(size, path)
             return dataset.numbers(np.float64, start, stop)
 
 

@@ -35,19 +35,23 @@ def fixed_array(file: StoredBytes, address: int, filtered: bool) -> Blocks:
     pages = -(-count // page)
     head = file.checked(at, prefix + (pages + 7) // 8 + 4, b"FADB")
     head.take(prefix - 4)
-    there = head.take((pages + 7) // 8)
+    there = _bits(head.take((pages + 7) // 8))
     begin = at + prefix + (pages + 7) // 8 + 4
     return Blocks(entry, _pages(file, begin, 0, count, page, entry, there))
 
 
+def _bits(content: bytes) -> list[bool]:
+    return [bool(byte & 0x80 >> bit) for byte in content for bit in range(8)]
+
+
 def _pages(
-    file: StoredBytes, at: int, first: int, count: int, page: int, entry: int, there: bytes
+    file: StoredBytes, at: int, first: int, count: int, page: int, entry: int, there: list[bool]
 ) -> list[tuple[int, bytes]]:
     """The pages of a block of entries that have been written, each with its checksum."""
     found = [(first, b"")]
     for index, number in enumerate(range(0, count, page)):
         size = min(page, count - number) * entry
-        if there[index // 8] & 0x80 >> index % 8:
+        if there[index]:
             content = file.checked(at, size + 4, b"")
             found.append((first + number, content.take(size)))
         at += size + 4
@@ -110,11 +114,13 @@ def _super_block(
     array: _Extensible, at: int, first: int, count: int, size: int
 ) -> Iterator[tuple[int, bytes]]:
     file = array.file
-    marks = (size // array.page + 7) // 8 if size > array.page else 0
+    pages = size // array.page if size > array.page else 0
+    marks = (pages + 7) // 8
     used = array.prefix + array.offset + count * (marks + file.offset_size) + 4
     fields = file.checked(at, used, b"EASB")
     fields.take(array.prefix - 4 + array.offset)
-    there = [fields.take(marks) for _ in range(count)]
+    bits = _bits(fields.take(count * marks))  # those of all blocks one after the other
+    there = [bits[block * pages : (block + 1) * pages] for block in range(count)]
     addresses = [fields.address() for _ in range(count)]
     yield from _data_blocks(array, addresses, first, size, there)
 
@@ -124,7 +130,7 @@ def _data_blocks(
     addresses: list[int | None],
     first: int,
     size: int,
-    there: list[bytes] | None,
+    there: list[list[bool]] | None,
 ) -> Iterator[tuple[int, bytes]]:
     """The entries of blocks of some size; those in pages have marks of which pages are there."""
     head = array.prefix + array.offset

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from facert.io.hdf5_reader.objects import (
     Messages,
     shared_message,
 )
-from facert.io.hdf5_reader.stored_bytes import DamagedError, StoredBytes
+from facert.io.hdf5_reader.stored_bytes import DamagedError, Fields, StoredBytes
 from facert.io.hdf5_reader.trees import new_records
 from facert.io.hdf5_reader.types import StoredType, read_shape, read_type
 
@@ -25,19 +25,33 @@ _BY_NAME = 8
 
 
 class Attribute(NamedTuple):
-    """An attribute of one element."""
+    """An attribute as it is stored."""
 
-    type: StoredType
+    type: bytes
+    shape: bytes
+    shared: int
+    """Bits for a type and a shape that another object has."""
     content: bytes
 
-    def value(self, file: StoredBytes) -> float | int | bool | bytes | None:
-        """The number or text; None for anything else."""
-        if self.type.text:
-            return text_of(self.type, self.content, GlobalHeap(file))
-        if self.type.numbers is None:
-            return None
-        found: float | int = np.frombuffer(self.content, self.type.numbers, 1)[0].item()
-        return bool(found) if self.type.flags else found
+    def value(self, file: StoredBytes) -> float | int | bool | bytes:
+        """The number or text; raises `DamagedError` also for anything else, or for several."""
+        type_ = read_type(self._part(file, self.type, 1, DATATYPE))
+        shape = read_shape(self._part(file, self.shape, 2, DATASPACE)).now
+        if shape is None or math.prod(shape) != 1:
+            raise DamagedError(f"an array of shape {shape}")
+        content = file.fields_of(self.content).take(type_.size)
+        if type_.text:
+            return text_of(type_, content, GlobalHeap(file))
+        if type_.numbers is None:
+            raise DamagedError(type_.name)
+        found: float | int = np.frombuffer(content, type_.numbers)[0].item()
+        return bool(found) if type_.flags else found
+
+    def _part(self, file: StoredBytes, content: bytes, bit: int, kind: int) -> Fields:
+        fields = file.fields_of(content)
+        if self.shared & bit:
+            return file.fields_of(shared_message(file, fields, kind))
+        return fields
 
 
 def text_of(type_: StoredType, element: bytes, heap: GlobalHeap) -> bytes:
@@ -47,33 +61,23 @@ def text_of(type_: StoredType, element: bytes, heap: GlobalHeap) -> bytes:
     return element.partition(b"\0")[0] if type_.ends_at_zero else element.rstrip(b"\0")
 
 
-def find_attribute(file: StoredBytes, messages: Messages, name: bytes) -> Attribute | None:
-    """Find an attribute; None where there is none.
+def read_attributes(file: StoredBytes, messages: Messages) -> Mapping[bytes, Attribute]:
+    """Read all attributes of an object; what they hold is looked at when it is asked for."""
+    found = (_attribute(file.fields_of(one)) for one in _attributes(file, messages))
+    return dict(found)
 
-    Raises `DamagedError` also for one of several elements, or of none.
-    """
-    for content in _attributes(file, messages):
-        fields = file.fields_of(content)
-        version, flags = fields.version(1, 2, 3), fields.number(1)
-        sizes = [fields.number(2) for _ in range(3)]
-        fields.take(1 if version == 3 else 0)
-        padding = 8 if version == 1 else 1
-        parts = []
-        for size in sizes:
-            parts.append(fields.take(size))
-            fields.take(-size % padding)
-        if parts[0].partition(b"\0")[0] != name:
-            continue
-        shared = flags if version > 1 else 0
-        for part, bit, kind in ((1, 1, DATATYPE), (2, 2, DATASPACE)):
-            if shared & bit:
-                parts[part] = shared_message(file, file.fields_of(parts[part]), kind)
-        type_ = read_type(file.fields_of(parts[1]))
-        shape = read_shape(file.fields_of(parts[2])).now
-        if shape is None or math.prod(shape) != 1:
-            raise DamagedError(f"an array of shape {shape}")
-        return Attribute(type_, fields.take(type_.size))
-    return None
+
+def _attribute(fields: Fields) -> tuple[bytes, Attribute]:
+    version, flags = fields.version(1, 2, 3), fields.number(1)
+    sizes = [fields.number(2) for _ in range(3)]
+    fields.take(1 if version == 3 else 0)
+    parts = []
+    for size in sizes:
+        parts.append(fields.take(size))
+        fields.take(-size % (8 if version == 1 else 1))
+    shared = flags if version > 1 else 0
+    name = parts[0].partition(b"\0")[0]
+    return name, Attribute(parts[1], parts[2], shared, fields.take(fields.left))
 
 
 def _attributes(file: StoredBytes, messages: Messages) -> Iterator[bytes]:

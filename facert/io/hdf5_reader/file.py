@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cached_property
 from typing import BinaryIO
 
-from facert.io.hdf5_reader.attributes import find_attribute
+from facert.io.hdf5_reader.attributes import Attribute, read_attributes
 from facert.io.hdf5_reader.dataset import Dataset, is_dataset
 from facert.io.hdf5_reader.links import Links, is_group, read_links
 from facert.io.hdf5_reader.objects import (
@@ -54,8 +56,13 @@ class StoredFile:
 
     def attribute(self, name: str) -> float | int | bool | bytes | None:
         """A number or text of the root; None where there is none."""
-        found = find_attribute(self._bytes, self._messages(self.root), name.encode())
+        found = self._attributes.get(name.encode())
         return None if found is None else found.value(self._bytes)
+
+    @cached_property
+    def _attributes(self) -> Mapping[bytes, Attribute]:
+        """The attributes of the root."""
+        return read_attributes(self._bytes, self._messages(self.root))
 
     def _messages(self, address: int) -> Messages:
         if address not in self._objects:
