@@ -120,15 +120,16 @@ def _head(like: Take) -> bytes:
 
 def _read(content: bytes) -> Take:
     with parsing("line 1", "what the recording is"):
-        line, _, rows = content.partition(b"\n")
-        facts = _facts(line)
+        begin = content.find(b"\n") + 1
+        facts = _facts(content[:begin])
         names, controls = tuple(facts["names"]), _controls(facts)
         texts = [facts["units"], facts["start_timecode"], *names, *(facts["controls"] or ())]
         if not all(isinstance(text, str) for text in texts):
             raise ValueError("a number where a text is due")
         size = len(names) * (3 if facts["kind"] == "markers" else 1)
         width = 1 + 2 * (0 if controls is None else len(controls.names)) + size
-        values = np.frombuffer(rows, "<f8", len(rows) // (8 * width) * width)
+        count = (len(content) - begin) // (8 * width)
+        values = np.frombuffer(content, "<f8", count * width, begin)
         return _take(values.reshape(-1, width), names, controls, facts)
 
 
