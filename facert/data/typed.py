@@ -95,10 +95,10 @@ class _Check:
         if is_dataclass(outer):
             return self.made(outer, value, field)  # type: ignore[arg-type]  # a type
         if isinstance(value, (list, tuple)):
-            return tuple(self(inner[0], one, f"{field}.{n}") for n, one in enumerate(value))
+            return tuple(self(inner[0], one, f"{field}/{n}") for n, one in enumerate(value))
         if isinstance(value, Mapping):
             return {
-                self(str, n, field): self(inner[1], v, f"{field}.{n}") for n, v in value.items()
+                self(str, n, field): self(inner[1], v, f"{field}/{n}") for n, v in value.items()
             }
         return self._plain(value, field)
 
@@ -111,12 +111,12 @@ class _Check:
         unknown = next((name for name in value if name not in known), None)
         if unknown is not None:
             fix = did_you_mean(str(unknown), known, "Update facert, if a newer one wrote it.")
-            raise InputError(f"{field}.{unknown}", "a known name", "another", fix)
+            raise InputError(f"{field}/{unknown}", "a known name", "another", fix)
         missing = next((name for name in known if name not in value and _is_due(known[name])), None)
         if missing is not None:
-            raise InputError(f"{field}.{missing}", "a value", "nothing", self._fix)
+            raise InputError(f"{field}/{missing}", "a value", "nothing", self._fix)
         hints = _hints(cast(Any, kind))
-        return kind(**{n: self(hints[n], one, f"{field}.{n}") for n, one in value.items()})
+        return kind(**{n: self(hints[n], one, f"{field}/{n}") for n, one in value.items()})
 
     def _word(self, words: Sequence[str], value: object, field: str) -> object:
         if not isinstance(value, str) or value not in words:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.take import Take
+from facert.data.typed import typed
 from facert.errors import FacertError
 from facert.evaluation.metrics import Scores, score
 from facert.evaluation.protocol import Draw, Problem, draw, held_out_take, training_take, true_poses
@@ -54,13 +55,10 @@ class Outcome:
 
         Raises
         ------
-        TypeError, KeyError
+        InputError
             When the values are of something else.
         """
-        scores = values["scores"]
-        if scores is not None:
-            scores = Scores(**{**scores, "per_control": tuple(scores["per_control"])})
-        return cls(**{**values, "cell": Cell(**values["cell"]), "scores": scores})
+        return typed(cls, values, "the outcome", "Evaluate the cell again.")
 
 
 def evaluate(problem: Problem, cell: Cell, settings: Settings) -> Outcome:

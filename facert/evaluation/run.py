@@ -13,6 +13,7 @@ import numpy as np
 
 from facert.data.take import Take
 from facert.data.version import VERSION
+from facert.errors import InputError
 from facert.evaluation.cells import Cell, Outcome, evaluate
 from facert.evaluation.processes import call_each
 from facert.evaluation.protocol import Problem, draw
@@ -110,7 +111,7 @@ def _kept(journal: Journal | None, wanted: set[Cell]) -> list[Outcome]:
         return []
     try:
         outcomes = [Outcome.from_dict(entry) for entry in journal.begin()]
-    except (TypeError, KeyError):
+    except InputError:
         log.warning("%s is damaged: begun anew", journal.path)
         journal.remove()
         journal.begin()

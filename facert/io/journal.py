@@ -12,6 +12,7 @@ from typing import Any
 from facert.errors import reading
 from facert.io.atomic import Appended, write_text
 from facert.io.guarded import read_text
+from facert.io.plain_json import parse_json
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +74,7 @@ def source_digest(folder: Path) -> str:
 def _parse(line: str) -> dict[str, Any] | None:
     """The object in a line; None for anything else."""
     try:
-        value = json.loads(line)
+        value = parse_json(line)
     except ValueError:
         return None
     return value if isinstance(value, dict) else None

@@ -91,6 +91,8 @@ def write_tensors(
     }
     head = {"format": format_name, "format_version": VERSION, "created_by": CREATED_BY}
     document = json.dumps(head | asdict(metadata), sort_keys=True, allow_nan=False)
+    if len(document) > MAX_HEADER:
+        raise _damaged("the header", f"at most {MAX_HEADER} bytes", f"{len(document)}")
     # Not save_file: it makes the file readable by its owner alone, whatever the umask.
     content = save(contiguous, {_KEY: document})
     with replacing(path, overwrite) as temporary:

@@ -68,7 +68,7 @@ class ModelMetadata:
         object.__setattr__(self, "figures", own)
         labels = self.counted_labels
         if not isinstance(labels, (int, float)) or labels < 0 or labels % 1:
-            raise _misfit("the metadata.labels", "a count", f"{labels!r}")
+            raise _misfit("the metadata/labels", "a count", f"{labels!r}")
 
     @classmethod
     def of(cls, model: TrainedModel) -> ModelMetadata:
@@ -79,7 +79,7 @@ class ModelMetadata:
             target_names=model.controls.names,
             settings=model.settings.as_dict(),
             units=_plain(model.units),
-            figures=model.facts["figures"],
+            figures={_plain(name): value for name, value in model.facts["figures"].items()},
             labels=model.labels,
             takes=tuple(map(_plain, model.takes)),
             motion_scale=None if model.motion is None else model.source_units.scale,
@@ -164,7 +164,7 @@ def _figure(name: str, value: object) -> float | str | None:
         return None
     plain = _plain(value) if isinstance(value, str) else value
     found: float | str | None = require_type(
-        float | str | None, plain, f"the metadata.figures.{name}", FIX
+        float | str | None, plain, f"the metadata/figures/{name}", FIX
     )
     return found
 

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from facert.data.text import plural, printable
+from facert.data.typed import typed
 from facert.errors import InputError, reading
 from facert.evaluation.figures import INK, LETTERS, plot_errors
 from facert.evaluation.table import EvaluationRow, columns_of, sections_of
 from facert.io.guarded import existing_file, read_text
+from facert.io.plain_json import parse_json
 from facert.pages.report.embedding import embedded
 from facert.pages.report.sections import Picture, Section, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+FIX = "Give what facert eval --json wrote."
 MAX_BYTES = 2**26
 MAX_ROWS = 20_000
 MOST_CONTROLS = 80  # that a picture names
@@ -41,8 +41,8 @@ def read_evaluation(path: Path) -> Section:
         if size > MAX_BYTES:
             raise _unexpected("file", f"at most {MAX_BYTES} bytes", f"{size}")
         try:
-            content = json.loads(read_text(path))
-        except (ValueError, RecursionError) as error:
+            content = parse_json(read_text(path))
+        except ValueError as error:
             raise _unexpected("file", "JSON", str(error)) from None
         return _section(path.name, *_checked(content))
 
@@ -113,35 +113,8 @@ def _checked(content: object) -> tuple[Mapping[str, Any], list[EvaluationRow]]:
     entries = content.get("rows")
     if not isinstance(entries, list) or not 0 < len(entries) <= MAX_ROWS:
         raise _unexpected("rows", f"1 to {MAX_ROWS} of them", "none, more, or no list")
-    return content["settings"], [_row(index, entry) for index, entry in enumerate(entries)]
-
-
-def _row(index: int, entry: object) -> EvaluationRow:
-    """A row whose values have the types that they should."""
-    hints = get_type_hints(EvaluationRow)
-    values: dict[str, Any] = {}
-    for field in fields(EvaluationRow):
-        where = f"rows/{index}/{field.name}"
-        value = entry.get(field.name, field.default) if isinstance(entry, dict) else MISSING
-        if field.name == "per_control":
-            value = tuple(_sequence(value))
-            good = all(_fits(part, float) for part in value)
-        else:
-            good = _fits(value, hints[field.name])
-        if not good:
-            raise _unexpected(where, "a finite number, or text", repr(value))
-        values[field.name] = value
-    return EvaluationRow(**values)
-
-
-def _fits(value: object, hint: Any) -> bool:
-    if hint is str:
-        return isinstance(value, str)
-    if value is None:
-        return bool(hint == float | None)
-    if isinstance(value, bool) or not isinstance(value, int if hint is int else (int, float)):
-        return False
-    return math.isfinite(value)
+    rows = (typed(EvaluationRow, e, f"rows/{index}", FIX) for index, e in enumerate(entries))
+    return content["settings"], list(rows)
 
 
 def _sequence(value: object) -> Sequence[Any]:
@@ -153,4 +126,4 @@ def _text(value: object) -> str:
 
 
 def _unexpected(field: str, expected: str, found: str) -> InputError:
-    return InputError(field, expected, found, "Give what facert eval --json wrote.")
+    return InputError(field, expected, found, FIX)

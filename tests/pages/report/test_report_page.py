@@ -132,7 +132,7 @@ def test_an_evaluation_of_failures_alone_has_tables_and_no_figures(tmp_path) -> 
     [
         (lambda content: content["rows"], "settings and rows"),
         (lambda content: content | {"rows": []}, "rows"),
-        (lambda content: content | {"rows": [7]}, "rows/0/method"),
+        (lambda content: content | {"rows": [7]}, "rows/0: expected a table"),
         (lambda content: content | {"rows": [content["rows"][0] | {"rms": "1"}]}, "rows/0/rms"),
         (lambda content: content | {"rows": [content["rows"][0] | {"labels": True}]}, "labels"),
         (lambda content: content | {"rows": [content["rows"][0] | {"rms": 1e999}]}, "rows/0/rms"),
