@@ -34,7 +34,8 @@ def plural(count: int, noun: str, nouns: str = "") -> str:
 
 def printable(text: str, most: int = 60) -> str:
     """Foreign text for a line of the log: short, with escapes for what would upset a terminal."""
-    return escaped(text if len(text) <= most else f"{text[:most]}[...]")
+    shown = escaped(text[: most + 1])
+    return shown if len(shown) <= most else f"{shown[:most]}[...]"
 
 
 def printable_lines(text: str) -> str:

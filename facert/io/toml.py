@@ -11,7 +11,6 @@ rotate = [0, 25, 0]
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
 from collections.abc import Sequence
@@ -82,5 +81,11 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _quoted(name: str) -> str:
-    """A name as a basic string of TOML; JSON escapes all but one character alike."""
-    return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
+    """A name as a basic string of TOML, of which nothing upsets a terminal."""
+    return '"' + "".join(map(_escaped, name)) + '"'
+
+
+def _escaped(sign: str) -> str:
+    if sign in '"\\':
+        return f"\\{sign}"
+    return sign if sign.isprintable() else f"\\U{ord(sign):08X}"

@@ -83,17 +83,8 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
     rate = str(Fraction(fps).limit_denominator())
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", rate)
     coded = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", _QUALITY)
-    command = (
-        get_ffmpeg_exe(),
-        "-v",
-        "error",
-        "-y",
-        *raw,
-        "-i",
-        "-",
-        *coded,
-        f"file:{path.absolute()}",
-    )
+    to = f"file:{path.absolute()}"  # a name alone might be taken for an option or a protocol
+    command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, to)
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
     ) as process:
@@ -108,5 +99,5 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
             process.kill()
             raise
     if process.returncode:
-        said = re.sub(r"\[.*?\] ", "", message.partition("\n")[0]).replace(str(path), "it")
+        said = re.sub(r"\[.*?\] ", "", message.partition("\n")[0]).replace(to, "it")
         raise OSError(errno.EIO, f"ffmpeg: {said or f'status {process.returncode}'}")

@@ -93,17 +93,23 @@ def _per_control(rows: Sequence[EvaluationRow], controls: Sequence[str]) -> Figu
         np.mean([row.per_control for row in rows if row.method == method], axis=0)
         for method in methods
     ]
-    size = (1.8 + 0.17 * len(controls), 1.7 + 0.24 * len(methods))
+    names = [printable(method, LETTERS) for method in methods]
+    left, below = _inches(names, 0.07), _inches(controls, 0.065)
+    size = (left + 0.17 * len(controls), below + 0.24 * len(methods))
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots()
     image = axes.imshow(np.array(errors), cmap="YlOrRd", vmin=0.0, aspect="auto")
     axes.set_xticks(range(len(controls)), controls, rotation=90, fontsize=7, color=INK)
-    names = [printable(method, LETTERS) for method in methods]
     axes.set_yticks(range(len(methods)), names, fontsize=8, color=INK)
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01).ax.tick_params(labelsize=7)
     return figure
+
+
+def _inches(names: Sequence[str], letter: float) -> float:
+    """Room for names beside a picture, and for what else stands there."""
+    return 1.0 + letter * max(12, *map(len, names))
 
 
 def _checked(content: object) -> tuple[Mapping[str, Any], list[EvaluationRow]]:
