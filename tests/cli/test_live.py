@@ -301,3 +301,30 @@ def test_names_that_the_model_does_not_know_are_reported(files):
     assert err.count(expected) == 1
     assert "8 with unknown names" in out
     assert "without a face" not in out
+
+
+@pytest.mark.slow
+def test_what_a_session_recorded_survives_its_kill_and_others_do_not_write_there(
+    facert, files, tmp_path
+):
+    path, model = files
+    record, out = tmp_path / "in.h5", tmp_path / "out.csv"
+    arguments = ("--out", f"csv:{out}", "--record", record, "-m", model)
+    with session("--in", "livelink:0", *arguments) as (process, port), socket.socket(
+        socket.AF_INET, socket.SOCK_DGRAM
+    ) as sender:  # fmt: skip
+        second = facert("live", "--in", f"take:{path}", *arguments, "--overwrite")
+        phone, going_on = PyLiveLinkFace(), tmp_path / "in.h5.recording"
+        sizes, end = [], time.monotonic() + PATIENCE
+        while len(set(sizes)) < 20:  # so many frames are recorded
+            assert time.monotonic() < end
+            phone.set_blendshape(FaceBlendShape.JawOpen, time.monotonic() % 1, no_filter=True)
+            sender.sendto(phone.encode(), ("127.0.0.1", port))
+            time.sleep(0.02)
+            sizes.append(going_on.stat().st_size)
+        process.kill()
+    assert (second.code, len(second.err.splitlines())) == (3, 1)
+    assert f"process {process.pid} is writing" in second.err
+    assert {one.suffix for one in tmp_path.iterdir()} == {".recording", ".lock"}
+    assert facert("convert", going_on, record).code == 0
+    assert len(api.read_take(record)) >= 19  # an empty file was seen as well

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,11 @@ from facert.data.names import ARKIT_SHAPES
 from facert.data.rig import Mesh
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
+from facert.io.claims import claims_kept
 from facert.io.importers.shared import Pose, ScriptError, write_poses
 from facert.io.journal import Journal
 from facert.io.mesh_sequence import new_mesh_sequence
-from facert.io.registry import write
+from facert.io.registry import require_replaceable, write
 from facert.io.tensors import write_tensors
 from facert.io.video import write_clip
 from facert.mesh.morphs import Morphs
@@ -35,6 +37,11 @@ WEIGHTS = RNG.random((FRAMES, len(ARKIT_SHAPES)))
 TAKE = Take(TIME, Source(WEIGHTS, ARKIT_SHAPES), Controls(ARKIT_SHAPES), WEIGHTS, fps=30.0)
 MESH = Mesh(RNG.random((300, 3)), np.arange(300).reshape(-1, 3), units="cm")
 MORPHS = Morphs(MESH, RNG.random((3, 300, 3)), ("a", "b", "c"), RNG.random((FRAMES, 3)), TIME)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """No metadata."""
 
 
 def mesh_sequence(path: Path) -> None:
@@ -99,7 +106,7 @@ WRITERS: dict[str, Callable[[Path], None]] = {
     "morphs.glb": lambda path: write("morphs", MORPHS, path),
     "morphs.usda": lambda path: write("morphs", MORPHS, path),
     "morphs.usdc": lambda path: write("morphs", MORPHS, path),
-    "model.safetensors": lambda path: write_tensors(path, {"a": WEIGHTS}, {"format": "x"}),
+    "model.safetensors": lambda path: write_tensors(path, {"a": WEIGHTS}, Facts(), "x"),
     "picture.png": picture,
     "picture.svg": picture,
     "picture.pdf": picture,
@@ -197,3 +204,15 @@ def test_a_process_that_could_not_write_hdf5_ends_as_it_should(tmp_path):
         command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, check=False
     )
     assert (done.returncode, done.stdout.split()) == (0, [b"output"] * 3), done.stderr
+
+
+def test_where_nothing_can_be_written_a_run_says_so_before_it_works(small_disk):
+    path = small_disk / "take.csv"
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    try:
+        with pytest.raises(InputError, match="Read-only file system"), claims_kept():
+            require_replaceable(path, overwrite=False)
+        with pytest.raises(InputError, match="Read-only file system"):
+            write("take", TAKE, path)
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
