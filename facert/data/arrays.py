@@ -18,9 +18,9 @@ IntArray = NDArray[np.int64]
 
 MAX_NAMES = 2**14
 """Most markers, weights or controls: no recording of a face has so many."""
-LATEST = 1e12
-"""Seconds from 0 to a frame, at most; a clock of whole nanoseconds is no clock of seconds."""
-RATES = (1e-9, 1e9)
+LATEST = 1e20
+"""Seconds from 0 to a frame, at most: nanoseconds of a calendar, taken for seconds, are less."""
+RATES = (1e-15, 1e15)
 """Frames a second, between which a rate lies."""
 LARGEST = 1e15
 """No coordinate of a mesh is larger, in whatever unit: products of four are numbers still."""

@@ -110,6 +110,14 @@ def require_memory(size: int, field: str, fix: str = "") -> None:
     _Limit(MOST).require(size, field, fix)
 
 
+def require_square(count: int, field: str, fix: str = "", copies: int = 4) -> None:
+    """Refuse a computation with matrices of `count` rows and columns that would not fit.
+
+    Raises `InputError` that names the field, as `require_memory` does.
+    """
+    require_memory(copies * FLOAT * count**2, f"{field} ({count})", fix)
+
+
 def readable(size: int) -> str:
     """A number of bytes for people.
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.memory import require_square
 
 ITERATIONS = 5
 RIDGE = 1e-6  # relative to the mean variance
@@ -45,6 +46,7 @@ class Gaussian:
         A few steps of expectation maximisation (Little and Rubin 2002, section 11.2): fill,
         estimate mean and covariance (with the fill's own covariance added), fill again.
         """
+        require_square(X.shape[1], "/source", "Take fewer markers.")
         hidden = np.isnan(X)
         if not hidden.any():
             return cls._of_complete(X)

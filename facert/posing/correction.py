@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.memory import require_square
 from facert.posing.completion import Posed
 from facert.preprocess.known_poses import Given, KnownPoses
 
@@ -80,6 +81,7 @@ def _fix(posed: Posed, controls: IntArray, values: FloatArray) -> None:
 
 def _error_covariance(poses: FloatArray, std: FloatArray | None) -> FloatArray:
     """E: the covariance of the errors of a retargeted pose, (P, P)."""
+    require_square(poses.shape[1], "/target/params", "Correct a take of fewer controls.")
     C = np.atleast_2d(np.cov(poses, rowvar=False))
     C[np.diag_indices_from(C)] += max(RIDGE * np.trace(C) / len(C), LEAST)
     S = C - C @ np.linalg.solve(C + SEEN * np.diag(C.diagonal()), C)

@@ -27,6 +27,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import softmax
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import require_square
 from facert.models.loo import KernelRidge, leave_one_out_errors
 
 NOISES = np.logspace(-3.5, 2.0, 9)
@@ -52,6 +53,7 @@ class PoseRegression:
     @classmethod
     def learn(cls, given: FloatArray, rest: FloatArray) -> PoseRegression:
         """The regression from given controls (n, k) of known poses to their rest (n, r)."""
+        require_square(len(given), "known poses", "Give fewer.")
         centre, scale, mean = given.mean(axis=0), _scale(given), rest.mean(axis=0)
         inputs = (given - centre) / scale
         distances, products = cdist(inputs, inputs), inputs @ inputs.T

@@ -39,6 +39,7 @@ POWERS: dict[SourceKind, float] = {"markers": 0.75, "weights": 0.5}
 APART = 0.2  # seconds between two suggested frames, where the take is long enough
 SLACK = 0.002  # by which the sum of distances may rise for a frame that shows more
 MOST_FRAMES = 1500  # candidates; in longer takes neighbours in time are much the same
+MANY = 1500  # columns, beyond which a matrix of all by all takes long
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +206,9 @@ def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> Float
     matrix = matrix[:, ~np.isnan(matrix).all(axis=0)]
     normalised = Normalisation.of(matrix, f"/source/{take.source.kind}").apply(matrix)
     filled = fill_gaps(normalised)
+    if filled.shape[1] > max(MANY, len(filled)):  # they span as many directions as there are rows
+        u, spread, _ = np.linalg.svd(filled - filled.mean(axis=0), full_matrices=False)
+        filled = u * spread
     axes = whitening(filled, POWERS[take.source.kind])
     return np.asarray((filled - filled.mean(axis=0)) @ axes)
 

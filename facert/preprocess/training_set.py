@@ -9,6 +9,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.matching_takes import as_takes
+from facert.data.memory import require_square
 from facert.data.take import Take
 from facert.data.takes import Takes
 from facert.data.text import listed
@@ -63,8 +64,11 @@ def choose_training_set(given: Take | Takes, settings: Settings) -> TrainingSet:
     serves = usable & serving(takes, settings.seed)
     others = order[serves[order] & ~np.isin(order, labels)]
     unlabelled = np.sort(others[: settings.unlabelled])
-    filled = _filled(X, np.concatenate([labels, unlabelled]), rng)
     assert take.params is not None  # there are labels
+    require_square(X.shape[1], "/source", "Train on fewer markers.")
+    require_square(take.params.shape[1], "/target/params", "Train on fewer controls.")
+    require_square(len(labels), "/target/params, poses", "Ask for fewer: --labels 100.")
+    filled = _filled(X, np.concatenate([labels, unlabelled]), rng)
     animation = take.params if take.animation is None else take.animation
     return TrainingSet(
         X_labelled=filled[: len(labels)],

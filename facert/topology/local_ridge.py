@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import require_square
 from facert.models.kernels import squared_exponential
 from facert.models.loo import KernelRidge, leave_one_out_errors
 from facert.topology.affine import scaled_source
@@ -51,6 +52,7 @@ def local_ridge(take: KeyedPerformance) -> FloatArray:
 
 def _nearness(rest: FloatArray) -> FloatArray:
     """Weights w_pq between feature points at rest (M, 3), (M, M)."""
+    require_square(len(rest), "feature points", "Give fewer.")
     radius = np.sqrt(np.mean(np.sum((rest - rest.mean(axis=0)) ** 2, axis=1)))
     distance = cdist(rest, rest) / (radius or 1.0)
     return np.asarray(np.exp(-distance / REACH) + EVERYWHERE)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.distance import cdist, pdist
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.memory import FLOAT, require_memory
 from facert.errors import InputError
 from facert.models.threads import one_thread
 from facert.topology.solution import Dense
@@ -39,6 +40,7 @@ def radial_basis(X: FloatArray, labelled: IntArray, kernel: RadialFunction) -> D
     InputError
         When labels are at one place, or fewer than an affine map of the points has freedoms.
     """
+    require_memory(3 * FLOAT * len(X) * len(labelled), "labels", "Give fewer.")
     places = X[labelled] - X[labelled].mean(axis=0)
     size = float(np.linalg.norm(places, axis=1).max()) or 1.0
     if pdist(places).min(initial=np.inf) <= SAME * size:

@@ -156,3 +156,22 @@ def test_a_rig_that_cannot_be_is_refused(changes, message):
 def test_attributes_are_plain_text():
     with pytest.raises(InputError, match=r"attribute units.*found 'cm\\x00'"):
         make_take(units="cm\0")
+
+
+@pytest.mark.parametrize("fps", [1e300, 1e-300, 0.0, np.inf, np.nan])
+def test_a_rate_that_is_none_is_refused(fps):
+    with pytest.raises(InputError, match="fps: expected"):
+        Take(np.arange(3) / 25, Source(np.eye(3), ("a", "b", "c")), fps=fps)
+
+
+def test_times_of_garbage_are_refused():
+    with pytest.raises(InputError, match=r"/time: expected seconds up to 1e\+20, found up to 1.0e"):
+        Take(np.array([0, 1, 1e300]), Source(np.eye(3), ("a", "b", "c")))
+
+
+@pytest.mark.parametrize("field", ["neutral", "shapes"])
+def test_a_coordinate_whose_square_is_infinite_is_refused(field):
+    arrays = {"neutral": np.eye(3), "shapes": np.zeros((1, 3, 3))}
+    arrays[field].flat[1] = -1e300
+    with pytest.raises(InputError, match=rf"/{field}: expected numbers of a sensible size"):
+        Rig(**arrays, names=("a",), faces=[[0, 1, 2]])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from facert.errors import InputError
 from facert.models import gaussian as model
 from facert.models.gaussian import Gaussian, fill_gaps
 
@@ -106,3 +107,8 @@ def test_what_a_fill_leaves_open_of_a_linear_function_is_its_conditional_varianc
         np.testing.assert_allclose(found, np.diag(B[h].T @ left @ B[h]), rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(variance[7], np.diag(B.T @ gaussian.covariance @ B))
     assert not variance[8].any()
+
+
+def test_a_covariance_that_would_fill_the_memory_is_refused():
+    with pytest.raises(InputError, match=r"/source \(60000\): expected at most .* of memory"):
+        Gaussian.of(np.zeros((2, 60_000)))

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from facert.data.arrays import MAX_NAMES
 from facert.data.text import listed, printable
 from facert.errors import InputError
 from facert.io.gltf.document import Document
@@ -48,7 +49,11 @@ def target_names(document: Document) -> dict[int, tuple[str, ...]]:
 
 
 def _count(mesh: dict[str, Any]) -> int:
-    return max(len(primitive.get("targets", [])) for primitive in mesh["primitives"])
+    count = max(len(primitive.get("targets", [])) for primitive in mesh["primitives"])
+    if count > MAX_NAMES:
+        fix = "Export the face alone."
+        raise InputError("targets", f"at most {MAX_NAMES} of a mesh", f"{count}", fix)
+    return count
 
 
 def _stated(

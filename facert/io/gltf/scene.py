@@ -8,7 +8,7 @@ does not count. Exporters put units, axes and quantisation into any of these mat
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,8 @@ class Scene:
     nodes: tuple[int, ...]
     worlds: dict[int, FloatArray]
     parents: dict[int, int]
+    _matrices: dict[int, FloatArray] = field(default_factory=dict)  # of skins that were asked for
+    _nearest: dict[tuple[int, ...], dict[int, int]] = field(default_factory=dict)
 
     def placement(self, node: int, attributes: dict[str, Any]) -> FloatArray:
         """Transforms of a mesh's vertices to the scene's space, (V, 4, 4); (1, 4, 4) of all alike.
@@ -53,12 +55,15 @@ class Scene:
 
     def _joint_matrices(self, skin: int) -> FloatArray:
         """World of the joint x inverse bind matrix of each joint, (J, 4, 4)."""
-        described = self.document.root["skins"][skin]
-        worlds = np.stack([self.worlds[joint] for joint in described["joints"]])
-        if "inverseBindMatrices" not in described:
-            return worlds
-        inverse = self.document.numbers(described["inverseBindMatrices"])[: len(worlds)]
-        return np.asarray(worlds @ inverse.reshape(len(worlds), 4, 4).transpose(0, 2, 1))
+        if skin not in self._matrices:
+            described = self.document.root["skins"][skin]
+            self.document.memory.require(3 * 16 * FLOAT * len(described["joints"]), "skins")
+            worlds = np.stack([self.worlds[joint] for joint in described["joints"]])
+            if "inverseBindMatrices" in described:
+                inverse = self.document.numbers(described["inverseBindMatrices"])[: len(worlds)]
+                worlds = worlds @ inverse.reshape(len(worlds), 4, 4).transpose(0, 2, 1)
+            self._matrices[skin] = worlds
+        return self._matrices[skin]
 
     def shares(
         self, node: int, attributes: dict[str, Any], driven: Sequence[int]
@@ -68,7 +73,7 @@ class Scene:
         None where all follow the nearest of them above the mesh alike, see `above`.
         """
         skin = self.document.root["nodes"][node].get("skin")
-        if skin is None or "JOINTS_0" not in attributes:
+        if skin is None or "JOINTS_0" not in attributes or not driven:
             return None
         joint, share = self._ties(attributes)
         followed = [self.above(one, driven) for one in self.document.root["skins"][skin]["joints"]]
@@ -80,10 +85,18 @@ class Scene:
 
     def above(self, node: int, driven: Sequence[int]) -> int:
         """Position of the nearest of some nodes that is this one or above it; -1 for none."""
-        places = {one: place for place, one in enumerate(driven)}
-        while node not in places and node in self.parents:
-            node = self.parents[node]
-        return places.get(node, -1)
+        return self._places(tuple(driven)).get(node, -1)
+
+    def _places(self, driven: tuple[int, ...]) -> dict[int, int]:
+        """What `above` is for every node; each comes after its parent, so that one walk does."""
+        if driven not in self._nearest:
+            places = {one: place for place, one in enumerate(driven)}
+            found: dict[int, int] = {}
+            for node in self.worlds if driven else ():
+                inherited = found.get(self.parents.get(node, -1), -1)
+                found[node] = places.get(node, inherited)
+            self._nearest[driven] = found
+        return self._nearest[driven]
 
     def _blended(self, matrices: FloatArray, attributes: dict[str, Any]) -> FloatArray:
         """Weighted means of joints' matrices, (V, 4, 4); all of the first joint without weights."""
@@ -121,12 +134,11 @@ def scene_of(document: Document) -> Scene:
     below = {child for node in nodes for child in node.get("children", [])}
     tops = [index for index in range(len(nodes)) if index not in below]
     scenes = document.root.get("scenes") or [{"nodes": tops}]
-    worlds: dict[int, FloatArray] = {}
-    parents: dict[int, int] = {}
-    shown = tuple(_walk(nodes, scenes[document.root.get("scene", 0)]["nodes"], worlds, parents))
+    found = _Walk(nodes, _transforms(nodes))
+    shown = tuple(found.below(scenes[document.root.get("scene", 0)]["nodes"]))
     for starts in (tops, range(len(nodes))):  # the latter for circles, which nothing leads to
-        list(_walk(nodes, starts, worlds, parents))
-    return Scene(document, shown, worlds, parents)
+        list(found.below(starts))
+    return Scene(document, shown, found.worlds, found.parents)
 
 
 def transformed(vertices: FloatArray, placement: FloatArray) -> FloatArray:
@@ -146,21 +158,46 @@ def mirrored(placement: FloatArray) -> bool:
     return bool(np.median(np.linalg.det(placement[:, :3, :3])) < 0)
 
 
-def _walk(
-    nodes: Any, starts: Any, worlds: dict[int, FloatArray], parents: dict[int, int]
-) -> Iterator[int]:
-    """Iterate over the nodes below some, each node once; find their transforms and parents."""
-    waiting = [(index, np.eye(4), -1) for index in reversed(starts)]
-    while waiting:
-        index, world, parent = waiting.pop()
-        if index in worlds:
-            continue
-        if parent >= 0:
-            parents[index] = parent  # the way that was gone: there are no circles in it
-        worlds[index] = world @ placed(*local_parts(nodes[index]))
-        yield index
-        children = reversed(nodes[index].get("children", []))
-        waiting += [(child, worlds[index], index) for child in children]
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """A walk over nodes, each once, which finds their transforms and parents."""
+
+    nodes: Any
+    own: FloatArray
+    """Transforms from each node's space to that of its parent, (N, 4, 4)."""
+    worlds: dict[int, FloatArray] = field(default_factory=dict)
+    parents: dict[int, int] = field(default_factory=dict)
+
+    def below(self, starts: Any) -> Iterator[int]:
+        """Iterate over the nodes below some, each that was not met before, before its children."""
+        waiting = [(index, np.eye(4), -1) for index in reversed(starts)]
+        while waiting:
+            index, world, parent = waiting.pop()
+            if index in self.worlds:
+                continue
+            if parent >= 0:
+                self.parents[index] = parent  # the way that was gone: there are no circles in it
+            self.worlds[index] = world @ self.own[index]
+            yield index
+            children = reversed(self.nodes[index].get("children", []))
+            waiting += [(child, self.worlds[index], index) for child in children]
+
+
+def _transforms(nodes: Sequence[dict[str, Any]]) -> FloatArray:
+    """Transforms from each node's space to that of its parent, (N, 4, 4)."""
+    from scipy.spatial.transform import Rotation  # takes its time
+
+    found = np.tile(np.eye(4), (len(nodes), 1, 1))
+    if not len(nodes):
+        return found
+    turns = Rotation.from_quat([node.get("rotation", (0, 0, 0, 1)) for node in nodes]).as_matrix()
+    scales = np.array([node.get("scale", (1, 1, 1)) for node in nodes], dtype=np.float64)
+    found[:, :3, :3] = turns * scales[:, None, :]
+    found[:, :3, 3] = [node.get("translation", (0, 0, 0)) for node in nodes]
+    for index, node in enumerate(nodes):
+        if "matrix" in node:
+            found[index, :3] = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T[:3]
+    return found
 
 
 def local_parts(node: dict[str, Any]) -> tuple[FloatArray, FloatArray, FloatArray]:

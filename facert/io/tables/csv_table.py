@@ -69,7 +69,7 @@ def read_csv_take(
             return learnable(read_livelink(path, fps), keep, sparse)
         if header and is_curve_table(header):
             return read_csv_curves(read_text(path))
-        require_few(header)
+        require_few(len(header))
         return read_table(path, fps, keep, sparse)
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import FileMemory
 from facert.data.rate import nominal_rate
 from facert.data.take import Source, Take, named_curves
 from facert.data.text import for_csv, from_csv
@@ -30,6 +31,7 @@ from facert.io.lines import check_width, parse_csv, to_numbers
 
 _DROPPED = re.compile("[\"' ,\n\r\t]")
 _NAME = "Name"
+_CELL = 16  # bytes of a number among all curves at all times, in a list and in an array
 _TIME = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _MARK = re.compile(rf'{MARK}\d[^,\n]*,|\[\{{"{_NAME}" : '.encode())
 
@@ -82,13 +84,15 @@ def read_csv_curves(text: str) -> Take:
     return _take(tuple(from_csv(row.cells[0]) for row in rows), time, values.T)
 
 
-def take_of_json_curves(rows: Sequence[Mapping[str, Any]]) -> Take:
+def take_of_json_curves(rows: Sequence[Mapping[str, Any]], memory: FileMemory) -> Take:
     """The take of weights that a Curve Table in JSON is.
 
-    Raises `InputError` for a value that is no number.
+    Raises `InputError` for a value that is no number, or when all curves at all times would take
+    more than the memory of the file.
     """
     curves = [{float(key): row[key] for key in row if key != _NAME} for row in rows]
     time = sorted({when for curve in curves for when in curve})
+    memory.require(_CELL * len(time) * len(curves), "curves")
     values = [[curve.get(when, np.nan) for curve in curves] for when in time]
     odd = next((v for row in values for v in row if isinstance(v, bool | str | list | dict)), None)
     if odd is not None:

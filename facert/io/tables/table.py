@@ -39,7 +39,7 @@ class Table:
     """A row's place in the file, for messages."""
 
     def __post_init__(self) -> None:
-        require_few(self.names)
+        require_few(len(self.names))
 
     def __len__(self) -> int:
         """Number of rows T."""
@@ -57,13 +57,13 @@ class Table:
         return InputError(where, expected, found, "Mend or remove it.")
 
 
-def require_few(columns: Sequence[str]) -> None:
+def require_few(columns: int) -> None:
     """Refuse more columns than the most markers have.
 
     Raises `InputError` that names the header.
     """
-    if len(columns) > MAX_COLUMNS:
-        found, fix = f"{len(columns)}", "Leave out what is not of the face."
+    if columns > MAX_COLUMNS:
+        found, fix = f"{columns}", "Leave out what is not of the face."
         raise InputError("header", f"at most {MAX_COLUMNS} columns", found, fix)
 
 
@@ -76,7 +76,7 @@ def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:
     Raises `InputError` naming the line and the column of the first cell that is no number among
     numbers.
     """
-    require_few(header)
+    require_few(len(header))
     check_width(rows, header)
     columns = range(len(header))
     texts: dict[int, Sequence[str]] = {}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.column_names import names_face, role_of_name
 from facert.data.columns import learnable
+from facert.data.memory import FileMemory
 from facert.data.take import Take
 from facert.data.text import listed, plural
 from facert.errors import InputError, reading
@@ -26,7 +27,7 @@ from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
 from facert.io.tables.curve_table import is_json_curve_table, take_of_json_curves
 from facert.io.tables.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
-from facert.io.tables.table import Table
+from facert.io.tables.table import Table, require_few
 from facert.io.tables.table_take import Reading, take_of_table
 
 log = logging.getLogger("facert")
@@ -58,7 +59,7 @@ def read_json_take(
             take = take_of_curves(document, fps)
             return take if _OWN.match(text) else learnable(take, keep, sparse)
         if is_json_curve_table(document):
-            return take_of_json_curves(document)
+            return take_of_json_curves(document, FileMemory(path))
         table = _table(_or_points(frames_of(document)))
         return take_of_table(table, Reading(rate_of(document) or fps, tuple(keep), sparse))
 
@@ -97,10 +98,12 @@ def _of_points(frame: Frame, key: str) -> Frame:
 
 def _table(frames: Sequence[Frame]) -> Table:
     """The frames as a table: what is no weight in front, then the weights."""
+    require_few(max(map(_size, frames), default=0))
     columns = _columns(frames, _weights(frames))
     rows: list[dict[str, Number | str]] = []
+    taken = frozenset(columns.values())
     for frame in frames:
-        row = {name: value for name, value in frame.plain.items() if _is_read(name, columns)}
+        row = {name: value for name, value in frame.plain.items() if _is_read(name, taken)}
         for key, group in frame.groups.items():
             row.update({columns[key, n]: v for n, v in group.items() if (key, n) in columns})
         rows.append(row)
@@ -118,6 +121,10 @@ def _table(frames: Sequence[Frame]) -> Table:
         else:
             numbers[:, column] = found
     return Table(names, numbers, texts, lambda row: f"frame {row + 1}")
+
+
+def _size(frame: Frame) -> int:
+    return len(frame.plain) + sum(map(len, frame.groups.values()))
 
 
 def _columns(frames: Sequence[Frame], groups: Sequence[str]) -> dict[tuple[str, str], str]:
@@ -166,10 +173,10 @@ def _is_of_face(key: str, frames: Sequence[Frame]) -> bool:
     return bool(names) and not names & _AXES and all(map(names_face, names))
 
 
-def _is_read(name: str, columns: Mapping[tuple[str, str], str]) -> bool:
+def _is_read(name: str, columns: Set[str]) -> bool:
     """Whether a frame's own number is used: beside groups of weights only what is known."""
     known = role_of_name(name) is not None or names_face(name)
-    return not columns or (known and name not in columns.values())
+    return not columns or (known and name not in columns)
 
 
 def _numbers(cells: Sequence[Number | str | None]) -> FloatArray | None:

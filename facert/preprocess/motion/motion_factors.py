@@ -20,6 +20,8 @@ ITERATIONS = 16
 COARSE, FINE = 0.1, 1e-3
 """Least standard deviation of the noise in the first and in the last iteration, normalised units.
 Large motion is learned first: with little noise from the start, the search hardly moves on."""
+MANY = 1500
+"""Columns, beyond which the covariance of all is dear."""
 ONCE_MORE = 1.0
 """The prior of each weight counts as much as so many frames of its factor."""
 
@@ -57,12 +59,11 @@ class MotionFactors(ArrayGroup):
 
     @classmethod
     def _principal(cls, X: FloatArray, count: int, least: float) -> MotionFactors:
-        covariance = np.cov(X, rowvar=False, bias=True).reshape(X.shape[1], X.shape[1])
-        variances, axes = np.linalg.eigh(covariance)
-        count = min(count, X.shape[1])
-        kept = np.maximum(variances[::-1][:count], np.finfo(float).eps)
-        weights = axes[:, ::-1][:, :count] * np.sqrt(kept)
-        left = np.maximum(np.diag(covariance) - (weights**2).sum(axis=1), 0.0)
+        variances, axes = _principal_axes(X)
+        count = min(count, len(variances))
+        kept = np.maximum(variances[:count], np.finfo(float).eps)
+        weights = axes[:, :count] * np.sqrt(kept)
+        left = np.maximum(X.var(axis=0) - (weights**2).sum(axis=1), 0.0)
         return cls(X.mean(axis=0), weights, left + least**2)
 
     def information(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -111,6 +112,19 @@ class MotionFactors(ArrayGroup):
         """The factors turned to be independent given a frame, the most certain first."""
         _, turn = np.linalg.eigh(self.weights.T @ (self.weights / self.noise[:, None]))
         return MotionFactors(self.mean, self.weights @ turn[:, ::-1], self.noise)
+
+
+def _principal_axes(X: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Variances, falling, and directions (d, r) of frames (n, d).
+
+    Of many columns the covariance is not made: their frames span few directions.
+    """
+    if X.shape[1] > max(MANY, len(X)):
+        _, spread, axes = np.linalg.svd(X - X.mean(axis=0), full_matrices=False)
+        return spread**2 / len(X), axes.T
+    covariance = np.cov(X, rowvar=False, bias=True).reshape(X.shape[1], X.shape[1])
+    variances, axes = np.linalg.eigh(covariance)
+    return variances[::-1], axes[:, ::-1]
 
 
 def _maximised(

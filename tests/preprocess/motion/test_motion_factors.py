@@ -98,3 +98,13 @@ def test_the_search_goes_far_enough_that_another_step_changes_little():
     before = found.weights @ found.weights.T
     again = stepped(found, X)
     assert np.abs(again.weights @ again.weights.T - before).max() < 0.05 * np.abs(before).max()
+
+
+def test_many_columns_have_the_same_factors_without_their_covariance(monkeypatch):
+    rng = np.random.default_rng(3)
+    X = rng.normal(size=(12, 3)) @ rng.normal(size=(3, 20)) + 0.01 * rng.normal(size=(12, 20))
+    plain = MotionFactors.learned(X, X, 0.01, 3)
+    monkeypatch.setattr(motion_factors, "MANY", 10)
+    spanned = MotionFactors.learned(X, X, 0.01, 3)
+    same = plain.weights @ plain.weights.T
+    np.testing.assert_allclose(spanned.weights @ spanned.weights.T, same, atol=1e-8)
