@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import http.client
-from collections.abc import Iterator, Mapping
+from collections.abc import Coroutine, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 from urllib.parse import quote, urlsplit
 
 import msgspec
@@ -23,6 +24,7 @@ from facert.errors import FacertError
 from facert.pages import guard
 from facert.pages.server import address, page_server
 
+Outcome = TypeVar("Outcome")
 PROTOCOL = f"viser-v{viser.__version__}"
 
 
@@ -41,6 +43,12 @@ def served() -> Iterator[tuple]:
             button.on_click(lambda event: seen.append(event.target.label))
         parts = {"slider": slider, "choice": choice, "save": save, "hidden": hidden}
         yield server, parts, seen
+
+
+def run(work: Coroutine[object, object, Outcome]) -> Outcome:
+    """What some work comes to, in a thread: Playwright keeps the loop of this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
 
 
 class Found(NamedTuple):
@@ -71,7 +79,7 @@ def opens(where: str, origin: str | None, host: str | None = None, cookie: str =
             await ours.recv()
 
     try:
-        asyncio.run(attempt())
+        run(attempt())
     except InvalidStatus as error:
         return error.response.status_code != 403
     return True
@@ -142,7 +150,7 @@ def sent(server, *messages: object) -> int | None:
             await asyncio.sleep(0.15)
             return ours.close_code
 
-    return asyncio.run(send())
+    return run(send())
 
 
 def update(part: object, **updates: object) -> dict[str, object]:
@@ -203,7 +211,7 @@ def test_so_many_visitors_and_no_more(served, monkeypatch) -> None:
         except InvalidStatus as error:
             return count if error.response.status_code == 503 else -1
 
-    assert asyncio.run(visit(0)) == 2
+    assert run(visit(0)) == 2
 
 
 def test_what_a_visitor_says_of_himself_is_not_printed(served, capfd) -> None:
