@@ -213,7 +213,7 @@ def _read_corrections(file: GuardedFile, params: FloatArray) -> Corrections | No
     if "/corrections/frames" not in file:
         return None
     frames = file.integers("/corrections/frames")
-    width, predicted = (file.numbers(f"/corrections/{name}") for name in ("width", "predicted"))
+    width, predicted = file.numbers("/corrections/width"), file.optional("/corrections/predicted")
     inside = (frames >= 0) & (frames < len(params))
     if params.ndim != 2 or not inside.all():
         expected, fix = f"frames of the take, 0 to {len(params) - 1}", "Correct the result anew."

@@ -48,6 +48,8 @@ from facert.io.tables.marker_header import marker_header
 from facert.io.tables.table import Table, is_number, is_text, require_few, table_of_lines
 from facert.io.tables.table_take import Reading, take_of_table, unlogged
 
+LARGEST = 1.797693134e308
+"""Ten digits of the largest number there is: rounded to ten, it would be infinite."""
 CURVE = "iteration,objective,gradient_norm,seconds"
 """The first line of the curve of a training, a table that is never read."""
 
@@ -184,7 +186,8 @@ def _body(time: FloatArray, values: FloatArray) -> str:
     """The rows of a table; times are written in full where ten digits do not distinguish them."""
     body = io.StringIO()
     formats = ["%.10g" if _is_short(time) else "%.17g", *["%.10g"] * values.shape[1]]
-    np.savetxt(body, np.column_stack([time, values]), fmt=formats, delimiter=",")
+    finite = np.clip(values, -LARGEST, LARGEST)  # NaN stays
+    np.savetxt(body, np.column_stack([time, finite]), fmt=formats, delimiter=",")
     return body.getvalue()
 
 
