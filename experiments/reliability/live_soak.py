@@ -113,7 +113,7 @@ def _check(counters, sent, frames: int, paths) -> None:
     assert counted <= packets
     assert counters.received <= frames
     assert counters.received == counters.mapped + counters.dropped + counters.failed
-    source, poses = (len(read_take_file(path)) for path in paths)
+    poses, source = (len(read_take_file(path)) for path in paths)
     print(f"recorded: {source} frames, {poses} poses")
     assert (source, poses) == (counters.received, counters.mapped)
     print(f"lost by the system: {packets - counted}")
