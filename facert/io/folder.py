@@ -39,8 +39,9 @@ def takes_in(folder: Path) -> list[Path]:
     """
     takes: list[Path] = []
     others: list[Path] = []
-    for path in files_in(folder):
-        (takes if _is_take(path) else others).append(path)
+    likely = set(files_in(folder))
+    for path in sorted(path for path in folder.iterdir() if path.is_file()):
+        (takes if path in likely and _is_take(path) else others).append(path)
     if others:
         names = listed([path.name for path in others], len(others))
         log.info("%s: passed over, as they are no takes: %s", folder.name, names)
