@@ -94,7 +94,7 @@ def claimed(path: Path) -> Iterator[Path]:
             made = [] if path.is_symlink() else _make_folders(place.parent)
             if lock not in _held:
                 _held[lock] = _Held(_acquire(lock, path), made)
-                _tidy(lock.parent)
+                _tidy(lock)
         _held[lock].count += 1
     try:
         yield place
@@ -231,19 +231,31 @@ def _release(lock: Path, held: _Held) -> None:
             folder.rmdir()
 
 
-def _tidy(folder: Path) -> None:
-    """Remove temporary files and locks of runs that are dead: nobody holds their claims."""
-    found: dict[str, list[str]] = {}
+def _tidy(acquired: Path) -> None:
+    """Remove temporary files and locks of runs that are dead: nobody else holds their claims.
+
+    `acquired` is the lock that this process has just got: whatever is beside it is of dead runs.
+    """
+    folder, found = acquired.parent, dict[str, list[Path]]()
     with suppress(OSError):
         for name in os.listdir(folder):  # noqa: PTH208  names alone, of a folder that may be large
             ours = _OURS.fullmatch(name)
             if ours:
-                found.setdefault(ours[1], []).append(name)
-    for key, names in found.items():
+                found.setdefault(ours[1], []).append(folder / name)
+    for key, paths in found.items():
         lock = folder / f"{PREFIX}{key}.lock"
-        if lock not in _held:
-            with suppress(OSError):  # somebody is at it, or it is not ours to remove
-                _remove(lock, [folder / name for name in names if folder / name != lock])
+        leftovers = [path for path in paths if path != lock]
+        with suppress(OSError):  # somebody is at it, or it is not ours to remove
+            if lock == acquired:
+                _unlink(leftovers)
+            elif lock not in _held:
+                _remove(lock, leftovers)
+
+
+def _unlink(leftovers: list[Path]) -> None:
+    for path in leftovers:
+        path.unlink(missing_ok=True)
+        log.debug("%s: removed, as its run is dead", path)
 
 
 def _remove(lock: Path, leftovers: list[Path]) -> None:
@@ -251,9 +263,7 @@ def _remove(lock: Path, leftovers: list[Path]) -> None:
     try:
         _lock(descriptor)
         if _is_at(descriptor, lock):
-            for path in leftovers:
-                path.unlink(missing_ok=True)
-                log.debug("%s: removed, as its run is dead", path)
+            _unlink(leftovers)
             lock.unlink()
     finally:
         os.close(descriptor)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import re
+import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
@@ -86,7 +89,11 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
     to = f"file:{path.absolute()}"  # a name alone might be taken for an option or a protocol
     command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, to)
     with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
+        command,
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        process_group=0,
+        preexec_fn=_end_with_parent if sys.platform == "linux" else None,
     ) as process:
         assert process.stdin is not None
         assert process.stderr is not None
@@ -101,3 +108,9 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
     if process.returncode:
         said = re.sub(r"\[.*?\] ", "", message.partition("\n")[0]).replace(to, "it")
         raise OSError(errno.EIO, f"ffmpeg: {said or f'status {process.returncode}'}")
+
+
+def _end_with_parent() -> None:
+    """Let Linux end this process with its parent: alone it would still write its file."""
+    set_death_signal = 1  # PR_SET_PDEATHSIG
+    ctypes.CDLL(None).prctl(set_death_signal, signal.SIGKILL)

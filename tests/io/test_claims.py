@@ -95,6 +95,7 @@ def test_a_run_claims_early_and_takes_over_from_a_dead_one(begin_writing, tmp_pa
     begin_writing(path).kill()
     write_text("again", path, overwrite=True)
     assert path.read_text() == "again"
+    assert list(path.parent.iterdir()) == [path]  # what the dead one wrote is gone
 
 
 def test_a_run_that_writes_nothing_leaves_no_folder(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from pathlib import Path
 
 import ezc3d
@@ -38,11 +39,14 @@ def test_a_glb_is_read_under_any_name(tmp_path: Path, name: str, caplog) -> None
 
 @pytest.mark.parametrize("name", ["face.json", "face", "face.gltf.txt"])
 def test_a_gltf_document_is_read_under_any_name(tmp_path: Path, name: str) -> None:
+    corners = np.eye(3, dtype="<f4").tobytes()
     root = {
         "asset": {"version": "2.0"},
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]}]}],
-        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}],
+        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3", "bufferView": 0}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": f"data:;base64,{b64encode(corners).decode()}"}],
     }
     (tmp_path / name).write_text(json.dumps(root))
     assert read_rig_file(tmp_path / name).names == ("target1",)
@@ -65,8 +69,8 @@ def test_other_formats_are_read_under_other_names(tmp_path: Path) -> None:
     markers["data"]["points"] = np.ones((4, 1, 20))
     markers.write(str(tmp_path / "d.c3d"))
     (tmp_path / "e.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-        "property float z\nend_header\n1 2 3\n"
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+        "property float z\nend_header\n1 2 3\n1 2 4\n"
     )
     (tmp_path / "f.csv").write_text("Timecode,BlendShapeCount,JawOpen\n01:00:00:00.0,1,0.5\n")
     for file in list(tmp_path.iterdir()):
@@ -75,7 +79,7 @@ def test_other_formats_are_read_under_other_names(tmp_path: Path) -> None:
     assert read_rig_file(tmp_path / "b.download").names == ("jawOpen",)
     assert read_take_file(tmp_path / "c.download").source.names == ("jawOpen",)
     assert read_take_file(tmp_path / "d.download").source.names == ("chin",)
-    assert len(read_mesh(tmp_path / "e.download").vertices) == 1
+    assert len(read_mesh(tmp_path / "e.download").vertices) == 2
     assert read_take_file(tmp_path / "f.download").source.names == ("jawOpen",)
 
 
