@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -109,17 +110,20 @@ def _kept(journal: Journal | None, wanted: set[Cell]) -> list[Outcome]:
     """The outcomes in the journal that belong to the grid."""
     if journal is None:
         return []
-    try:
-        outcomes = [Outcome.from_dict(entry) for entry in journal.begin()]
-    except InputError:
-        log.warning("%s is damaged: begun anew", journal.path)
-        journal.remove()
-        journal.begin()
-        return []
+    outcomes = [o for entry in journal.begin() if (o := _outcome(entry, journal.path))]
     kept = list({o.cell: o for o in outcomes if o.cell in wanted}.values())
     if kept:
         log.info("%d of %d cells are done, in %s", len(kept), len(wanted), journal.path)
     return kept
+
+
+def _outcome(entry: dict[str, Any], path: Path) -> Outcome | None:
+    """The outcome of an entry; None where its fields are damaged: that cell alone is done again."""
+    try:
+        return Outcome.from_dict(entry)
+    except InputError as error:
+        log.warning("%s: passed over a damaged cell: %s", path, error)
+        return None
 
 
 def _lost(_problem: Problem, cell: Cell, _settings: Settings, reason: str) -> Outcome:

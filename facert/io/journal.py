@@ -11,7 +11,7 @@ from typing import Any
 
 from facert.errors import reading
 from facert.io.atomic import Appended, write_text
-from facert.io.guarded import read_text
+from facert.io.guarded import read_old_text
 from facert.io.plain_json import parse_json
 
 log = logging.getLogger(__name__)
@@ -55,7 +55,9 @@ class Journal:
         if not self.path.exists():
             return []
         with reading(self.path):
-            lines = read_text(self.path).splitlines()
+            lines = read_old_text(
+                self.path
+            ).splitlines()  # one byte that is no UTF-8 costs one line
         header, *entries = [_parse(line) for line in lines] or [None]
         if header != {"fingerprint": self._fingerprint}:
             log.warning("%s is of other work: begun anew", self.path)

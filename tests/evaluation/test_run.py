@@ -1,5 +1,6 @@
 import json
 import logging
+import resource
 from dataclasses import replace
 from itertools import islice
 from multiprocessing import active_children
@@ -150,6 +151,36 @@ def test_a_damaged_journal_is_begun_anew(make, quick, tmp_path):
     journal.begin()
     journal.add({"cell": 1, "scores": None})
     assert len(list(run(problem, Grid(("ridge",), (4,), (10,), 1), quick, journal=journal))) == 1
+
+
+def test_damaged_entries_of_a_journal_cost_their_cells_alone(make, quick, tmp_path, caplog):
+    problem = make()
+    journal = Journal(tmp_path / "cells.jsonl", fingerprint(problem, quick))
+    first = list(run(problem, GRID, quick, journal=journal))
+    header, fields, nobody, *rest = journal.path.read_bytes().splitlines(keepends=True)
+    fields = fields.replace(b'"cell": {', b'"call": {')
+    nobody = nobody.replace(b'"method": "', b'"method": "\xff')
+    journal.path.write_bytes(b"".join((header, fields, nobody, *rest)))
+    outcomes = list(run(problem, GRID, quick, journal=journal))
+    assert outcomes[: len(rest)] == first[2:]  # times included: nothing was computed again
+    assert scores(outcomes) == scores(first)
+    assert caplog.text.count("passed over a damaged cell") == 1
+
+
+def test_a_journal_that_cannot_be_written_is_kept(make, quick, tmp_path):
+    problem = make()
+    journal = Journal(tmp_path / "cells.jsonl", fingerprint(problem, quick))
+    grid = Grid(("ridge",), (4,), (10,), 1)
+    list(run(problem, grid, quick, journal=journal))
+    before = journal.path.read_bytes()
+    room = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, room[1]))
+    try:
+        with pytest.raises(InputError, match=r"cells\.jsonl"):
+            list(run(problem, grid, quick, journal=journal))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, room)
+    assert journal.path.read_bytes() == before
 
 
 def test_the_fingerprint_is_of_data_protocol_and_settings(make, make_take, quick):
