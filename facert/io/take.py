@@ -16,7 +16,7 @@
 ``/corrections/``                          optional: which poses of a result somebody corrected
 ``  frames``          (c,) int             the frames; ``/target/params`` has their poses
 ``  width``           (c,)                 seconds from the beginning of their windows to the end
-``  predicted``       (T, P)               the poses without corrections
+``  predicted``       (T, P)               optional: the poses without corrections
 ``  std``             (T, P)               optional: their standard deviation
 attributes                                 format, format_version, fps, units, created_by,
                                            optional start_timecode, up_axis, clock_start, model

@@ -65,7 +65,6 @@ def test_facert_without_corrections_refuses_such_a_file_and_reads_every_other(tm
         ("predicted", np.zeros((8, 3)), "/corrections/predicted"),
         ("predicted", np.zeros((7, 2)), "/corrections/predicted"),
         ("predicted", np.full((8, 2), np.inf), "/corrections/predicted"),
-        ("predicted", None, "/corrections/predicted"),
         ("std", np.zeros((8, 1)), "/corrections/std"),
     ],
 )

@@ -190,6 +190,7 @@ def test_keys_are_the_pages_after_a_click_and_do_not_turn_the_camera(pose_page) 
     (client,) = page._server.get_clients().values()
     seen._track("jaw_open").locator(".mantine-Slider-trackContainer").click()
     assert seen.until(lambda: len(page.editor.pins) == 1)
+    seen.page.wait_for_timeout(300)  # the slider may send its value once more
     before = client.camera.position
     for _ in range(3):
         seen.page.keyboard.press("ArrowRight")
