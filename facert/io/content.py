@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from facert.errors import InputError
+from facert.io.guarded import read_beginning
+
 _GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 _CERTAIN = {
     b"glTF\x02\x00\x00\x00": _GLTF,
@@ -34,9 +37,8 @@ def endings_by_content(path: Path, likely: bool) -> tuple[str, ...]:
     With `likely`, also what the content may be by little.
     """
     try:
-        with path.open("rb") as file:
-            head = file.read(HEAD).removeprefix(_MARK)
-    except OSError:
+        head = read_beginning(path, HEAD).removeprefix(_MARK)
+    except (OSError, InputError):
         return ()
     known = _CERTAIN | _LIKELY if likely else _CERTAIN
     for first, endings in known.items():

@@ -34,7 +34,9 @@ def existing_file(path: Path) -> Path:
     Raises `InputError` when there is nothing, a folder, or a file without permission.
     """
     if not (path.is_file() and os.access(path, os.R_OK)):
-        found = "a folder" if path.is_dir() else "no permission" if path.exists() else "nothing"
+        found = "a folder" if path.is_dir() else "nothing"
+        if path.exists() and not path.is_dir():
+            found = "no permission" if path.is_file() else "a pipe or a device"
         raise InputError("file", "an existing file", found, "Check the name.", where=str(path))
     return path
 

@@ -242,10 +242,10 @@ def open_guarded(path: Path) -> Iterator[GuardedFile]:
 def stated_format(path: Path) -> str:
     """The format that an HDF5 file states; empty for a file of another kind, or none."""
     try:
-        with path.open("rb") as file:
+        with existing_file(path).open("rb") as file:
             if not is_hdf5(file, os.fstat(file.fileno()).st_size):
                 return ""
-    except OSError:
+    except (OSError, InputError):
         return ""
     with open_guarded(path) as guarded:
         return guarded.text_attribute("format")

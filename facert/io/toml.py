@@ -26,6 +26,12 @@ REGIONS_EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInne
 DRIVERS_EXAMPLE = '[[eyeLookInLeft]] with node = "eye_L" and rotate = [0, 25, 0] below'
 WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+_PARTS = 32
+_LONG_KEY = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    + f"{{{_PARTS}}}"
+)
+"""A key of more parts between dots than anybody writes; tomllib takes their square in time."""
 
 
 def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
@@ -35,7 +41,10 @@ def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
     """
     with reading(path):
         try:
-            return tomllib.loads(read_text(path))
+            text = read_text(path)
+            if _LONG_KEY.search(text):
+                raise ValueError(f"a key of more than {_PARTS} parts")
+            return tomllib.loads(text)
         except (ValueError, RecursionError) as error:
             expected = f"TOML such as {example}"
             raise InputError("file", expected, f"{error}", "Correct the file.") from error

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 from base64 import b64encode
 from pathlib import Path
+from threading import Thread
 
 import ezc3d
 import numpy as np
@@ -14,7 +16,10 @@ from gltf_files import Builder
 from facert.data.rig import Rig
 from facert.data.take import Source, Take
 from facert.errors import InputError
+from facert.io.content import endings_by_content
 from facert.io.formats import read_any, read_mesh, read_rig_file, read_take_file
+from facert.io.guarded import existing_file
+from facert.io.hdf5 import stated_format
 from facert.io.rig import write_rig
 from facert.io.take import write_take
 
@@ -114,3 +119,16 @@ def test_an_ending_that_fits_its_content_is_not_mentioned(tmp_path: Path, caplog
     write_rig(RIG, tmp_path / "b.hdf5")
     read_any(tmp_path / "b.hdf5")
     assert not caplog.records
+
+
+@pytest.mark.parametrize("look", [stated_format, lambda path: endings_by_content(path, True)])
+def test_nothing_waits_for_a_pipe(tmp_path, look):
+    path = tmp_path / "pipe.csv"
+    os.mkfifo(path)
+    found = []
+    looking = Thread(target=lambda: found.append(look(path)), daemon=True)
+    looking.start()
+    looking.join(5)
+    assert not any(found[0])
+    with pytest.raises(InputError, match="found a pipe or a device"):
+        existing_file(path)

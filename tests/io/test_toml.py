@@ -1,12 +1,14 @@
 """Regions in TOML: what is written for editing is what is read."""
 
+import time
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from facert import InputError
 from facert.data.regions import Region, Regions
-from facert.io.toml import WIDTH, read_regions, regions_text
+from facert.io.toml import WIDTH, read_regions, read_toml, regions_text
 
 NAMES = st.lists(
     st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=30),
@@ -49,3 +51,15 @@ def test_a_file_of_something_else_is_refused_by_name(tmp_path, text, message):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.toml: file: expected an existing file"):
         read_regions(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("part", ["a", '"b \\" c"', "'d.'"])
+def test_a_key_of_very_many_parts_is_refused_at_once(tmp_path, part):
+    path = tmp_path / "deep.toml"
+    path.write_text(f"{' . '.join([part] * 40_000)} = 1\n")
+    began = time.process_time()
+    with pytest.raises(InputError, match="a key of more than 32 parts"):
+        read_toml(path)
+    assert time.process_time() - began < 1
+    path.write_text(f'{".".join(["a"] * 20)} = "{"." * 100}" # {"." * 100}\n')
+    assert list(read_toml(path)) == ["a"]
