@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray, require_sensible
 from facert.data.names import match
 from facert.data.take import Source, Take
 from facert.errors import InputError
@@ -93,6 +93,7 @@ def stabilise(
         found = stable_markers(_markers(reference.source))
         stable = [reference.source.names[index] for index in found]
     chosen = _chosen(take.source, stable)
+    require_sensible(np.nan_to_num(markers[:, chosen]), "/source/markers")
     shape = _mean_shape(markers[:, chosen])
     seen = ~np.isnan(markers[:, chosen, 0])
     known = determined(shape, seen)

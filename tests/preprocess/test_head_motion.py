@@ -154,3 +154,8 @@ def test_a_marker_that_strays_in_a_few_frames_is_as_stable_as_before(face):
     for marker in (1, 4, 6):
         strayed[rng.permutation(400)[:8], marker] += 5.0
     assert set(stable_markers(strayed)) <= set(range(8))
+
+
+def test_markers_whose_squares_are_no_numbers_are_refused(face, as_take):
+    with pytest.raises(InputError, match="/source/markers: expected numbers of a sensible size"):
+        stabilise(as_take(face * 1e300), STABLE)
