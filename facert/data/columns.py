@@ -25,6 +25,7 @@ ENOUGH = 10
 """Fewest rows that show a shape: a clock, a counter or a flag."""
 
 _WEIGHTS = 1.5  # within this range a clock looks like a ramp of a weight
+_HUGE = 1e150  # whose square is a number still
 _BEYOND = 1e5
 _LINEAR = 1e-2  # of the range, by which a clock strays from a line
 _FEW = 4  # rows that copy the frames' numbers exactly
@@ -95,6 +96,7 @@ def roles_of(
     names: Sequence[str], values: FloatArray, time: FloatArray, sparse: bool = False
 ) -> dict[int, Role]:
     """The columns (T, D) that are no weights, by name or else by shape; see `weight_columns`."""
+    values = np.clip(values, -_HUGE, _HUGE)  # shapes are told from differences and their squares
     named = {column: role_of_name(name) for column, name in enumerate(names)}
     roles = {
         column: role

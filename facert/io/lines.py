@@ -28,6 +28,7 @@ _FIXED = 4  # decimals from which on all numbers of a column have as many by int
 _QUOTED = re.compile(r'"(?:[^"]|"")*"')
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_PLAIN = re.compile(r"[+-]?\d*\.\d+")
 _COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 
 
@@ -179,8 +180,9 @@ def _stops_short(last: Line, before: Sequence[Line]) -> bool:
     if not cell or not all(map(_NUMBER.fullmatch, above)):
         return False
     decimals = {len(text.partition(".")[2]) for text in above}
-    # Who writes zeros at the end writes them always.
-    fixed = len(decimals) == 1 and min(decimals) >= _FIXED and any(t[-1] == "0" for t in above)
+    # Who writes zeros at the end of decimals writes them always; that of an exponent says nothing.
+    zeros = any(t[-1] == "0" for t in above) and all(map(_PLAIN.fullmatch, above))
+    fixed = zeros and len(decimals) == 1 and min(decimals) >= _FIXED
     short = fixed and len(cell.partition(".")[2]) < min(decimals)
     return short or _NUMBER.fullmatch(cell) is None
 

@@ -79,6 +79,12 @@ def test_numbers_without_zeros_at_the_end_are_whole(tmp_path):
     assert len(read_take_file(path)) == 6
 
 
+def test_a_zero_at_the_end_of_an_exponent_is_no_decimal(tmp_path):
+    path = tmp_path / "whole.csv"
+    path.write_text("time,jaw\n0,1.5e-270\n0.1,2.5e-324\n0.2,3.5e+154\n0.3,0\n")
+    assert len(read_take_file(path)) == 4
+
+
 def test_live_link_face_loses_its_last_row(tmp_path, caplog):
     path = tmp_path / "killed.csv"
     path.write_text(live_link()[:-40])
