@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.reliability import bomb_scenes  # noqa: F401  it registers its own
-from experiments.reliability.bomb_files import BOMBS
+from experiments.reliability import bomb_archives, bomb_captures  # noqa: F401  they register
+from experiments.reliability.bomb_registry import BOMBS
 
 LIMIT = 6 << 30  # bytes of address space
 PATIENCE = 15  # CPU seconds after which a process is killed

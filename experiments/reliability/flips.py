@@ -32,9 +32,10 @@ from facert.io.take import read_take, write_take
 
 PATIENCE = 20  # seconds after which a read is taken for one that never ends
 PATTERNS: dict[str, Callable[[int], int]] = {
-    "inverted": lambda byte: byte ^ 0xFF,
     "lowest bit": lambda byte: byte ^ 0x01,
-    "zero": lambda _: 0,
+    "highest bit": lambda byte: byte ^ 0x80,
+    "0": lambda _: 0,
+    "255": lambda _: 0xFF,
 }
 
 
