@@ -41,7 +41,9 @@ def path_energy(frames: int) -> sparse.csc_array:
 
 def path_laplacian(frames: int) -> sparse.csr_array:
     """L = I - D⁻¹ A of a path; the first and the last frame have one neighbour, (T, T)."""
-    before = sparse.eye_array(frames, k=-1)
+    # Not by eye_array: SciPy 1.13 knows no diagonal beside that of a single frame.
+    later = np.arange(1, frames)
+    before = sparse.coo_array((np.ones(len(later)), (later, later - 1)), shape=(frames, frames))
     return random_walk(sparse.csr_array(before + before.T))
 
 

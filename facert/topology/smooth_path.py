@@ -1,8 +1,13 @@
 """The smoothest path in time through the key poses, and how far to trust it between them.
 
 The smoothest path, ∫ ‖y''‖² dt = trace(Ŷᵀ S Ŷ) least, is Y = A Ŷ. As a prior of the target it is a
-Gaussian process, whose covariance between the keys is the pseudo-inverse S⁺, and A S⁺ between all
-frames and the keys.
+Gaussian process: from an unknown constant, the integral of a Brownian bridge, as y' is at rest in
+the first key, at time 0, and in the last, at 1. Its covariance
+
+    k(s, t) = s² (6 t - 2 s - 3 t²) / 12,      s ≤ t,
+
+less the means over the keys is S⁺ between the keys, and A S⁺ between all frames and the keys. So
+neither is S needed nor its rank, which rounding would decide where keys come in bursts.
 
 How far to trust the path cannot be learned from the key poses: to leave one out doubles the gap
 that the path must bridge. But of the source all frames are known. Where the path through its key
@@ -22,7 +27,6 @@ from facert.topology.keyed import KeyedPerformance
 MOST = 30.0  # τ where the path misses nothing of the source
 BALANCE = 0.2  # times what a linear map misses: where time is trusted half as much
 STEEPNESS = 6
-RANK = 1e-15  # share of the largest stiffness: less is rounding
 FARTHEST = 1e13  # ratio beyond which τ is 0
 
 
@@ -43,38 +47,38 @@ class SmoothPath:
     ----------
     influence : array, shape (T, K)
         A: the path is A Ŷ.
-    stiffness : array, shape (K, K)
-        S: its ∫ y''² is trace(Ŷᵀ S Ŷ).
     """
 
     def __init__(self, frames: int, keys: IntArray) -> None:
         order = np.argsort(keys)
         times = keys[order].astype(np.float64)
+        frames_within = np.clip(np.arange(frames), times[0], times[-1])
         spline = CubicSpline(times, np.eye(len(keys))[order], bc_type="clamped")
-        self.influence: FloatArray = spline(np.clip(np.arange(frames), times[0], times[-1]))
-        bent = spline(times, 2)  # the second derivative, linear between the keys
-        before, after, gap = bent[:-1], bent[1:], np.diff(times)[:, None] / 6.0
-        product = before.T @ (gap * after)
-        ends = before.T @ (gap * before) + after.T @ (gap * after)
-        self.stiffness: FloatArray = 2.0 * ends + product + product.T
+        self.influence: FloatArray = spline(frames_within)
+        self._frames = (frames_within - times[0]) / (times[-1] - times[0])  # times from 0 to 1
+        self._keys = keys
 
     def covariance(self) -> FloatArray:
         """Covariance of all frames with the keys, (T, K), for paths less their mean over the keys.
 
         Rows add up to 0, so do the rows of the keys, and the mean variance of the keys is 1.
         """
-        stiffness, paths = np.linalg.eigh(self.stiffness)
-        paths -= paths.mean(axis=0)
-        # S⁺ without the first path, the constant, which alone bends nothing: S has rank K - 1.
-        bent = np.maximum(stiffness[1:], RANK * stiffness[-1])
-        between_keys = (paths[:, 1:] / bent) @ paths[:, 1:].T
-        return np.asarray(self.influence @ between_keys / between_keys.diagonal().mean())
+        with_keys = integrated_bridge(self._frames[:, None], self._frames[self._keys])
+        with_keys -= with_keys[self._keys].mean(axis=0)
+        with_keys -= with_keys.mean(axis=1, keepdims=True)
+        return np.asarray(with_keys / with_keys[self._keys].diagonal().mean())
 
     def missed(self, take: KeyedPerformance) -> float:
         """Error ε of the path through the source's key frames, as a share of its motion."""
         motion = float(np.linalg.norm(take.frames - take.frames.mean(axis=0)))
         path = self.influence @ take.frames[take.keys]
         return float(np.linalg.norm(path - take.frames)) / motion if motion > 0 else 0.0
+
+
+def integrated_bridge(s: FloatArray, t: FloatArray) -> FloatArray:
+    """Covariance k(s, t) of the integral of a Brownian bridge, at times from 0 to 1."""
+    early, late = np.minimum(s, t), np.maximum(s, t)
+    return np.asarray(early**2 * (6.0 * late - 2.0 * early - 3.0 * late**2) / 12.0)
 
 
 def trust_in_path(by_path: float, by_map: float) -> float:
