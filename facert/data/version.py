@@ -1,5 +1,5 @@
 """The release of facert, which the files that it writes name."""
 
-VERSION = "0.1.0"
+VERSION = "0.4.0"
 MARK = "facert "
 CREATED_BY = f"{MARK}{VERSION}"

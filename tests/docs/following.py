@@ -164,7 +164,7 @@ def _resolved(line: str) -> tuple[str, Any, list[str]]:
     """Name and object of the command in a line, and its arguments."""
     name, *arguments = shlex.split(line, comments=True)
     command: Any = typer.main.get_command(app.app)
-    while arguments and isinstance(command, typer.core.TyperGroup):
+    while isinstance(command, typer.core.TyperGroup) and arguments and arguments[0][0] != "-":
         name = arguments.pop(0)
         assert name in command.commands, f"no such command: {line}"
         command = command.commands[name]

@@ -24,7 +24,7 @@ from facert.demo.character import animate
 
 README, DATA = ROOT / "README.md", ROOT / "data" / "README.md"
 PAGES = sorted(DOCS.glob("*.md"))
-TEXTS = [README, DATA, *PAGES]
+TEXTS = [*sorted(ROOT.glob("*.md")), DATA, *PAGES]
 ON_THEIR_OWN = {
     "phone-to-blender.md": "phone-demo/shot.h5",
     "optical-markers.md": "optical-demo/result.h5",
