@@ -201,6 +201,8 @@ PROTOCOLS: Mapping[str, NetworkProtocol] = {
     "osc": NetworkProtocol(9000, _named, 9000, OscEncoder),
     "ifacialmocap": NetworkProtocol(49983, lambda _: IFacialMocapDecoder()),
 }
+INPUTS = (*PROTOCOLS, *IN_FILES)
+OUTPUTS = (*(kind for kind, one in PROTOCOLS.items() if one.out_port is not None), *OUT_FILES)
 
 
 def _resolve(address: Address, host: str) -> tuple[socket.AddressFamily, SocketAddress]:

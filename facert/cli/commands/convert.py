@@ -9,9 +9,11 @@ from typing import Annotated, Literal
 from facert.cli.shared.batch import carry_out, plan
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
+    AXES,
     DRIVERS,
     ENDING,
     JOBS,
+    LENGTH_UNITS,
     OUT_DIR,
     OVERWRITE,
     SHAPES,
@@ -72,12 +74,23 @@ def command(
         list[str] | None,
         option("A column of IN to keep that looks like a clock, a counter or a flag; repeatable."),
     ] = None,
-    in_units: Annotated[str, option("Unit of IN, instead of the one it states.")] = "",
-    units: Annotated[
-        str, option("Unit of OUT: m, dm, cm, mm, in or ft; numbers are converted.")
+    in_units: Annotated[
+        str,
+        option("Unit of IN, instead of the one it states.", autocompletion=LENGTH_UNITS),
     ] = "",
-    in_up_axis: Annotated[str, option("The axis up in IN, instead of the one it states.")] = "",
-    up_axis: Annotated[str, option("The axis up in OUT: y, z or x; turned.")] = "",
+    units: Annotated[
+        str,
+        option(
+            "Unit of OUT: m, dm, cm, mm, in or ft; numbers are converted.",
+            autocompletion=LENGTH_UNITS,
+        ),
+    ] = "",
+    in_up_axis: Annotated[
+        str, option("The axis up in IN, instead of the one it states.", autocompletion=AXES)
+    ] = "",
+    up_axis: Annotated[
+        str, option("The axis up in OUT: y, z or x; turned.", autocompletion=AXES)
+    ] = "",
     start_timecode: Annotated[
         str, option("Of the first frame, HH:MM:SS:FF; drop-frame HH:MM:SS;FF.")
     ] = "",

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.completion import names_in
 from facert.cli.shared.files import require_name, warn_of_unit
 from facert.cli.shared.in_and_out import require_inputs
-from facert.cli.shared.options import OVERWRITE, SHAPES, argument, file_option, option
+from facert.cli.shared.options import LENGTH_UNITS, OVERWRITE, SHAPES, argument, file_option, option
 from facert.data.text import plural
 from facert.io.registry import endings
 
@@ -44,7 +45,8 @@ def command(
         str,
         option(
             "smooth, framework, literal (the paper's, as printed), laplacian, cotangent, "
-            "biharmonic, rbf-linear or rbf-thin-plate."
+            "biharmonic, rbf-linear or rbf-thin-plate.",
+            autocompletion=names_in("facert.topology.driving.METHODS"),
         ),
     ] = "smooth",
     tolerance: Annotated[
@@ -57,7 +59,11 @@ def command(
         ),
     ] = 0.5,
     in_units: Annotated[
-        str | None, option("Unit of MESH, instead of the one it states: m, cm, mm, in or ft.")
+        str | None,
+        option(
+            "Unit of MESH, instead of the one it states: m, cm, mm, in or ft.",
+            autocompletion=LENGTH_UNITS,
+        ),
     ] = None,
     shapes: SHAPES = None,
     overwrite: OVERWRITE = False,

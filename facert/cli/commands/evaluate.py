@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.completion import lists_of
 from facert.cli.shared.files import (
     read_character,
     require_name,
@@ -66,7 +67,11 @@ def command(
         ),
     ] = None,
     methods: Annotated[
-        str, option("all, or names with commas, of " + ", ".join(REGISTRY) + ".")
+        str,
+        option(
+            "all, or names with commas, of " + ", ".join(REGISTRY) + ".",
+            autocompletion=lists_of("facert.methods.registry.REGISTRY", "all"),
+        ),
     ] = "all",
     repeats: Annotated[int, option("Random draws of each.", min=1)] = 20,
     unlabelled: Annotated[

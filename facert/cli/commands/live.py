@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.completion import names_in
 from facert.cli.shared.interrupt import interruptible
 from facert.cli.shared.options import (
     AS_JSON,
@@ -48,6 +49,7 @@ def command(
             "or take:FILE, played in real time.",
             "--in",
             metavar="KIND[:PORT]",
+            autocompletion=names_in("facert.live.endpoints.INPUTS"),
         ),
     ],
     outputs: Annotated[
@@ -57,6 +59,7 @@ def command(
             "again for more.",
             "--out",
             metavar="KIND[:HOST[:PORT]]",
+            autocompletion=names_in("facert.live.endpoints.OUTPUTS"),
         ),
     ],
     model: Annotated[

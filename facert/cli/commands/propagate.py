@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.completion import names_in
 from facert.cli.shared.in_and_out import require_in_and_out, require_inputs
 from facert.cli.shared.options import OVERWRITE, TARGET, argument, file_option, numbers, option
 from facert.data.text import plural
@@ -36,7 +37,8 @@ def command(
         str,
         option(
             "residual, path, framework (the paper's), literal (as printed), laplacian, "
-            "rbf-linear, rbf-thin-plate, ridge, affine or spline."
+            "rbf-linear, rbf-thin-plate, ridge, affine or spline.",
+            autocompletion=names_in("facert.topology.propagation.METHODS"),
         ),
     ] = "residual",
     window: Annotated[

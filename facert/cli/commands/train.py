@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from facert.cli.shared import console
+from facert.cli.shared.completion import Completion, names_in, words
 from facert.cli.shared.in_and_out import require_inputs
 from facert.cli.shared.options import (
     DEFAULT_MODEL,
@@ -43,6 +44,12 @@ if TYPE_CHECKING:
     from facert.models.optim.monitor import Monitor
     from facert.retarget.retargeter import Retargeter
 
+NAMED_IN = {
+    "method": "facert.methods.registry.REGISTRY",
+    "source_kernel": "facert.models.kernels.KERNELS",
+    "target_kernel": "facert.models.kernels.KERNELS",
+}
+"""The tables that list what a setting may name."""
 SMALL = 0.01  # of numbers below it digits are shown, not decimals
 
 
@@ -61,13 +68,24 @@ def _option(name: str) -> inspect.Parameter:
     plain: type = next((one for one in (bool, int, float) if one in (kind, *get_args(kind))), str)
     plain = list[str] if name == "neutral" else plain  # one for each take
     methods = f" One of {', '.join(REGISTRY)}." if name == "method" else ""
-    words = "|".join(choices(kind)) or None
     made = option(
-        about.help + methods, show_default=default_text(name), metavar=words, panel=about.group
+        about.help + methods,
+        show_default=default_text(name),
+        metavar="|".join(choices(kind)) or None,
+        panel=about.group,
+        autocompletion=_completion(name),
     )
     annotation = Annotated[plain | None, made]  # type: ignore[valid-type]  # made of a value
     keyword = inspect.Parameter.KEYWORD_ONLY
     return inspect.Parameter(name, keyword, default=None, annotation=annotation)
+
+
+def _completion(name: str) -> Completion | None:
+    """What Tab offers for a setting: the words that it knows; else files."""
+    kind, _ = DESCRIBED[name]
+    if name in NAMED_IN:
+        return names_in(NAMED_IN[name])
+    return words(*choices(kind)) if choices(kind) else None
 
 
 @with_settings

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from facert.cli.shared.completion import names_in, result_endings, words
 from facert.cli.shared.help import FILES
 
 if TYPE_CHECKING:
     from facert.retarget.options import RetargetOptions
     from facert.retarget.retargeter import Retargeter
 
+LENGTH_UNITS = names_in("facert.data.units.METRES")
+AXES = words("x", "y", "z")
 DEFAULT_MODEL = Path("model.safetensors")
 
 
@@ -47,7 +50,11 @@ SIGMA = Annotated[
 ]
 DEVICE = Annotated[
     str,
-    option("Where the shared models compute: cpu or cuda; all others stay on the CPU.", "--device"),
+    option(
+        "Where the shared models compute: cpu or cuda; all others stay on the CPU.",
+        "--device",
+        autocompletion=words("cpu", "cuda"),
+    ),
 ]
 HOST = Annotated[str, option("Address of the page; 0.0.0.0 for other machines as well.", "--host")]
 PORT = Annotated[int, option("Port of the page, or the next free one.", "--port")]
@@ -102,7 +109,10 @@ OUT_DIR = Annotated[
 ENDING = Annotated[
     str | None,
     file_option(
-        "Of the files in --out-dir; their format goes by it.", "--ending", show_default=".h5"
+        "Of the files in --out-dir; their format goes by it.",
+        "--ending",
+        show_default=".h5",
+        autocompletion=result_endings,
     ),
 ]
 JOBS = Annotated[
