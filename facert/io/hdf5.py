@@ -347,9 +347,9 @@ def _check_layout(dataset: Dataset, path: str) -> None:
     """Refuse data that lie in other files or need plug-ins."""
     if dataset.elsewhere:
         raise _outside(path, "a virtual dataset or external storage")
-    if dataset.foreign_filter is not None:
+    if dataset.foreign_filter:
         expected = "only gzip, lzf, shuffle and fletcher32"
-        fix = "Write it again with one of these."
+        fix = "Write it again with one of these; h5repack -f GZIP=4 does it."
         raise InputError(path, expected, f"filter {dataset.foreign_filter}", fix)
     if dataset.shape is None:
         raise _unexpected(path, "an array", "an empty dataspace")

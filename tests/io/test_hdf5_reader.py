@@ -123,6 +123,36 @@ def test_many_links_and_attributes(path, version, ordered):
         assert guarded.text_attribute("longer") == "y" * 40000
 
 
+def text_of_length(size, padding):
+    kind = h5py.h5t.C_S1.copy()
+    kind.set_size(size)
+    kind.set_strpad(padding)
+    return kind
+
+
+@pytest.mark.parametrize("padding", ["SPACEPAD", "NULLPAD", "NULLTERM"])
+def test_texts_of_fixed_length_however_they_are_filled_up(path, padding):
+    names = np.array([b"jaw", b"", b"brow up"])
+    with h5py.File(path, "w") as file:
+        kind = text_of_length(8, getattr(h5py.h5t, f"STR_{padding}"))
+        space = h5py.h5s.create_simple(names.shape)
+        h5py.h5d.create(file.id, b"names", kind, space).write(h5py.h5s.ALL, h5py.h5s.ALL, names)
+    with open_guarded(path) as guarded:
+        assert guarded.names("/names") == ("jaw", "", "brow up")
+
+
+def test_flags_and_empty_text_as_pytables_has_them(path):
+    flags = np.array([1, 0, 1], np.uint8)
+    with h5py.File(path, "w") as file:
+        space, kind = h5py.h5s.create_simple(flags.shape), h5py.h5t.STD_B8LE
+        data = h5py.h5d.create(file.id, b"flags", kind, space)
+        data.write(h5py.h5s.ALL, h5py.h5s.ALL, flags, kind)
+        file.attrs["units"] = h5py.Empty("S1")
+    with open_guarded(path) as guarded:
+        assert guarded.flags("/flags").tolist() == [True, False, True]
+        assert guarded.text_attribute("units", "cm") == ""
+
+
 def test_the_checksum_is_that_of_its_author():
     assert checksum(b"Four score and seven years ago") == 0x17770551
 

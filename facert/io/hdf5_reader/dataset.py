@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from facert.io.hdf5_reader.attributes import text_of
 from facert.io.hdf5_reader.chunks import Chunked, ChunkTable
-from facert.io.hdf5_reader.filters import KNOWN, read_filters, unpacked
+from facert.io.hdf5_reader.filters import KNOWN, OTHERS, read_filters, unpacked
 from facert.io.hdf5_reader.heaps import GlobalHeap
 from facert.io.hdf5_reader.layout import Layout, read_layout
 from facert.io.hdf5_reader.objects import (
@@ -54,9 +54,10 @@ class Dataset:
         return f"{self.type.name} {self.shape}"
 
     @property
-    def foreign_filter(self) -> int | None:
-        """The number of a filter that is not known, if there is one."""
-        return next((number for number in self._filters if number not in KNOWN), None)
+    def foreign_filter(self) -> str:
+        """Name or number of a filter that is not known; empty if there is none."""
+        foreign = (number for number in self._filters if number not in KNOWN)
+        return next((OTHERS.get(number, str(number)) for number in foreign), "")
 
     @property
     def values_of_a_chunk(self) -> int:

@@ -11,6 +11,11 @@ from facert.io.hdf5_reader.stored_bytes import DamagedError, Fields
 
 GZIP, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
 KNOWN = frozenset((GZIP, SHUFFLE, FLETCHER32, LZF))
+OTHERS = {
+    4: "szip", 5: "nbit", 6: "scaleoffset", 305: "lzo", 307: "bzip2", 32001: "blosc", 32004: "lz4",
+    32008: "bitshuffle", 32013: "zfp", 32015: "zstd", 32026: "blosc2",
+}  # fmt: skip
+"""Some that programs use, for messages."""
 
 
 def read_filters(fields: Fields) -> tuple[int, ...]:

@@ -13,7 +13,8 @@ _OTHERS = {
     2: "times", 4: "bit fields", 5: "opaque data", 6: "compounds", 7: "references",
     9: "sequences", 10: "arrays", 11: "complex numbers",
 }  # fmt: skip
-_INTEGER, _FLOAT, _TEXT, _ENUMERATION, _VARIABLE = 0, 1, 3, 8, 9
+_INTEGER, _FLOAT, _TEXT, _BITS, _ENUMERATION, _VARIABLE = 0, 1, 3, 4, 8, 9
+_PADDINGS = ("", "\0", " ")
 _MOST_DIMENSIONS = 32
 # Of IEEE 754: precision, then place and size of the exponent and the mantissa, and the bias.
 _IEEE = {
@@ -37,8 +38,11 @@ class StoredType:
     """Whether the integers stand for booleans."""
     text: Literal["", "fixed", "variable"] = ""
     """How text is stored; empty where there is none."""
-    ends_at_zero: bool = False
-    """Whether text of fixed length ends at its first zero, and not before its last ones."""
+    padding: str = ""
+    """What fills up text of fixed length; empty where a zero ends it."""
+
+
+_FLAGS = StoredType("bool", 1, np.dtype(np.uint8), flags=True)
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,9 @@ def read_type(fields: Fields) -> StoredType:
     if kind == _FLOAT:
         return _float(fields, bits, size)
     if kind == _TEXT:
-        return StoredType(f"text of {size} bytes", size, text="fixed", ends_at_zero=not bits & 15)
+        return _fixed_text(bits & 15, size)
+    if kind == _BITS and size == 1:
+        return _FLAGS  # as PyTables has booleans
     if kind == _ENUMERATION:
         return _enumeration(fields, bits & 0xFFFF, version)
     if kind == _VARIABLE and bits & 15 == 1:
@@ -88,6 +94,12 @@ def read_shape(fields: Fields) -> Shape:
         return Shape(now, now)
     most = tuple(fields.address() for _ in range(rank))  # without a limit: as an undefined address
     return Shape(now, most)
+
+
+def _fixed_text(padding: int, size: int) -> StoredType:
+    if padding >= len(_PADDINGS):
+        raise DamagedError(f"text with padding {padding}")
+    return StoredType(f"text of {size} bytes", size, text="fixed", padding=_PADDINGS[padding])
 
 
 def _order(bits: int) -> str:
@@ -118,7 +130,7 @@ def _enumeration(fields: Fields, members: int, version: int) -> StoredType:
         raise DamagedError(f"names of {base.name}")
     names = [_member(fields, version) for _ in range(members)]
     if sorted(names) == [b"FALSE", b"TRUE"] and base.size == 1:
-        return StoredType("bool", 1, np.dtype(np.uint8), flags=True)
+        return _FLAGS
     return base
 
 
