@@ -22,6 +22,7 @@ from facert.models.kernels import squared_exponential
 TIED = 0.05  # ε: near markers are tied a little, even where noise hides how they move
 NEIGHBOUR = 3  # h is twice the median distance to the neighbour of this rank
 LEAST_SHARE = 0.125  # of the markers, in either group
+FLAT = 1e-5  # share of their largest extent: less is how they were rounded
 FEWEST = 4  # markers that can be parted
 
 
@@ -86,7 +87,7 @@ def _order(ties: FloatArray) -> FloatArray:
 def _on_plane(order: FloatArray, places: FloatArray) -> FloatArray:
     """The linear function of the places (M, 3) that comes nearest to the order, (M,)."""
     centred = places - places.mean(axis=0)
-    slope = np.linalg.lstsq(centred, order - order.mean(), rcond=None)[0]
+    slope = np.linalg.lstsq(centred, order - order.mean(), rcond=FLAT)[0]
     return np.asarray(centred @ slope)
 
 

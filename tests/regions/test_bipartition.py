@@ -58,6 +58,17 @@ def test_a_plane_parts_the_face_even_through_noise():
     assert abs(normal[1]) > 0.9 * np.linalg.norm(normal)  # one above, one below
 
 
+@pytest.mark.parametrize("seed", [2, 3, 7])
+def test_how_flat_markers_were_rounded_across_their_plane_does_not_matter(seed):
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-5.0, 5.0, (20, 3)) * [1.0, 1.0, 0.0]
+    inner = np.linalg.norm(places, axis=1) < 3.0
+    together = rng.normal(size=(100, 1, 1)) * inner[:, None] * [1.0, 1.0, 0.0]
+    frames = places + together + 0.1 * rng.normal(size=(100, 20, 3)) * [1.0, 1.0, 0.0]
+    rounded = frames + 1e-8 * rng.normal(size=(20, 1)) * [0.0, 0.0, 1.0]
+    assert same_parts(two_groups(rounded), two_groups(frames))
+
+
 def test_weights_are_parted_without_places():
     rng = np.random.default_rng(0)
     upper = np.arange(10) < 4

@@ -42,6 +42,7 @@ DECREMENT = 1e-4
 # Rounding of the energy, mostly of θ1 - kᵀK⁻¹k against a small noise: not a reason to reject.
 ROUNDING = 1e-7
 SHIFTED_DECREMENT = 1e-9  # a shifted step predicts little, however much is left
+FLAT = 1e-12  # share of the largest curvature: the sign of less is rounding
 SHIFT = 1e-3  # first shift after a rejected step, relative to the largest curvature
 # Frames solved together; bounds the memory at about 2 CHUNK q (N + d_x) doubles, the device's too.
 CHUNK, DEVICE_CHUNK = 128, 4096
@@ -296,7 +297,7 @@ def _leave_saddles(
     except np.linalg.LinAlgError:
         pass  # one at least: look at all
     values, vectors = np.linalg.eigh(hessian[done])
-    saddle = values[:, 0] < 0.0
+    saddle = values[:, 0] < -FLAT * values[:, -1]
     rows = np.flatnonzero(done)[saddle]
     # A fall of about 0.005 nats along the direction of negative curvature.
     length = 0.1 / np.sqrt(-values[saddle, 0])

@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import minimize
 
 from facert.models.gp.posterior import Posterior
-from facert.models.gplvm.source_mapping import CHUNK, Observation, SourceMapping
+from facert.models.gplvm.source_mapping import CHUNK, Observation, SourceMapping, _leave_saddles
 from facert.models.kernels import KERNELS, SquaredExponential
 
 THETA = {"variance": 1.2, "inverse_width": 0.5, "noise": 0.02}
@@ -145,6 +145,15 @@ def test_frames_end_at_a_stationary_point(name):
 def solve_random_frames(seed):
     mapping = make_mapping(seed, latent_dim=3, columns=9)
     return mapping.solve(Observation.of(make_frames(mapping, 60, missing=0.3), SIGMA_C))
+
+
+def test_rounding_makes_no_saddle_where_the_energy_is_flat():
+    curvatures = np.array([[-1e-17, 1.0], [-1e-2, 1.0], [1e-17, 1.0]])
+    step, descent = np.zeros((3, 2)), np.zeros(3)
+    hessian = curvatures[:, :, None] * np.eye(2)
+    saddle = _leave_saddles(hessian, step, descent, np.ones(3, dtype=bool))
+    np.testing.assert_array_equal(saddle, [False, True, False])
+    np.testing.assert_allclose(np.abs(step), [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]], atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
