@@ -31,7 +31,12 @@ ORDINARY = 0.95
 """This share of all distances from the rigid shape is ordinary: skin and noise."""
 STRAY = 3.0
 """At so many times an ordinary distance a marker has a quarter of its weight."""
-PAIRS_AT_ONCE, FEWEST_FRAMES, MOST_FRAMES = 20_000_000, 50, 500
+DISTANCES, FEWEST_FRAMES, MOST_FRAMES = 20_000_000, 50, 500
+"""Distances that are compared, in some frames, evenly spread."""
+AT_ONCE = 1_000_000
+"""Distances that are in memory at once."""
+CANDIDATES = 600
+"""Of more markers, so many evenly spread ones are looked at: they are more than enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,32 +143,54 @@ def stable_markers(markers: FloatArray) -> IntArray:
     InputError
         When fewer than three markers were ever seen.
     """
-    kept = [int(index) for index in np.flatnonzero(~np.isnan(markers[:, :, 0]).all(axis=0))]
-    if len(kept) < 3:
+    seen = np.flatnonzero(~np.isnan(markers[:, :, 0]).all(axis=0))
+    if len(seen) < 3:
         raise InputError(
-            "/source/markers", "three markers or more", f"{len(kept)}", "Check the export."
+            "/source/markers", "three markers or more", f"{len(seen)}", "Check the export."
         )
-    change = _distance_change(markers) ** 2
-    most = max(FEWEST, math.ceil(SHARE * len(kept)))
-    while len(kept) > most:
-        kept.pop(int(change[np.ix_(kept, kept)].sum(axis=1).argmax()))
-    return np.array(kept, dtype=np.int64)
+    if len(seen) > CANDIDATES:
+        seen = seen[np.linspace(0, len(seen) - 1, CANDIDATES).round().astype(np.int64)]
+    change = _distance_change(markers[:, seen]) ** 2
+    total = change.sum(axis=1)  # to the markers that are left
+    for _ in range(len(seen) - max(FEWEST, math.ceil(SHARE * len(seen)))):
+        worst = total.argmax()
+        total -= change[:, worst]
+        total[worst] = -np.inf
+    return np.asarray(seen[total > -np.inf])
 
 
 def _distance_change(markers: FloatArray) -> FloatArray:
     """Change of the distance of each pair, (M, M); the most for pairs never seen together."""
     frames, count = markers.shape[:2]
-    some = int(np.clip(PAIRS_AT_ONCE // count**2, FEWEST_FRAMES, MOST_FRAMES))
+    some = int(np.clip(DISTANCES // count**2, FEWEST_FRAMES, MOST_FRAMES))
     few = markers[np.linspace(0, frames - 1, min(some, frames)).round().astype(np.int64)]
-    first, second = np.triu_indices(count, 1)
-    distance = np.linalg.norm(few[:, first] - few[:, second], axis=2)
-    together = ~np.isnan(distance).all(axis=0)
-    spread = np.full(len(first), np.nanmax(distance))
-    low, high = np.nanquantile(distance[:, together], [0.05, 0.95], axis=0)
-    spread[together] = (high - low) / 2.0
-    change = np.zeros((count, count))
-    change[first, second] = change[second, first] = spread
+    few = np.ascontiguousarray(few.transpose(1, 0, 2))
+    change, farthest = np.full((count, count), np.nan), 0.0
+    rows = max(AT_ONCE // (few.shape[1] * count), 1)
+    for start in range(0, count, rows):
+        here = slice(start, start + rows)
+        distance = np.linalg.norm(few[here, None] - few[None, start:], axis=3)
+        farthest = max(farthest, float(np.nanmax(distance, initial=0.0)))
+        low, high = _quantiles(distance, (0.05, 0.95))
+        change[here, start:] = (high - low) / 2.0
+        change[start:, here] = change[here, start:].T
+    change = np.where(np.isnan(change), farthest, change)
+    np.fill_diagonal(change, 0.0)
     return change
+
+
+def _quantiles(values: FloatArray, shares: Sequence[float]) -> list[FloatArray]:
+    """Quantiles over the last axis of what is not NaN, between neighbours; NaN where nothing is."""
+    ordered = np.sort(values, axis=-1)  # NaN comes last
+    last = np.maximum((~np.isnan(values)).sum(axis=-1, keepdims=True) - 1, 0)
+    found = []
+    for place in (share * last for share in shares):
+        low = np.floor(place).astype(np.int64)
+        below, above = (
+            np.take_along_axis(ordered, at, axis=-1) for at in (low, np.minimum(low + 1, last))
+        )
+        found.append(np.asarray((below + (place - low) * (above - below))[..., 0]))
+    return found
 
 
 def _markers(source: Source) -> FloatArray:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from facert.data.arrays import FloatArray, IntArray
-from facert.data.memory import require_square
 from facert.data.take import Source, Take
 from facert.preprocess.cache import keep_last
 from facert.preprocess.faults.absurd import absurd_positions, absurd_weights
@@ -80,7 +79,6 @@ def _of_weights(weights: FloatArray, posed: IntArray | None) -> Faults:
 
 def _of_markers(markers: FloatArray) -> Faults:
     """Faults of markers (T, M, 3)."""
-    require_square(3 * markers.shape[1], "/source/markers", "Take fewer markers, or --no-detect.")
     zero = np.asarray((markers == 0.0).all(axis=2))
     seen = np.where(zero[:, :, None], np.nan, markers)
     absurd = absurd_positions(seen)

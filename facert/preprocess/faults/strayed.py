@@ -15,8 +15,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.mesh.rigid import align
-from facert.models.gaussian import Gaussian
-from facert.preprocess.faults.prediction import off, spread_rows
+from facert.preprocess.faults.prediction import Expected, parts_of, spread_rows
 from facert.preprocess.faults.quantiles import median, quantile
 from facert.preprocess.faults.runs import whole_runs
 
@@ -49,6 +48,8 @@ MOST = 0.8
 """A marker is not suspect in more than this share of the frames."""
 OTHERS = 40
 """Markers that distances are taken to, at most."""
+AT_ONCE = 4_000_000
+"""Distances that are in memory at once."""
 PLACED = 2
 """How often the shape is estimated anew."""
 
@@ -57,25 +58,25 @@ PLACED = 2
 class _Expectation:
     """A distribution of the frames, and how far off a position is a stray, (M,)."""
 
-    gaussian: Gaussian
+    expected: Expected
     size: float  # Of the face
     limit: FloatArray
 
     def strays(self, markers: FloatArray, suspect: BoolArray) -> BoolArray:
         """The positions of frames (T, M, 3) that are strays, (T, M), from a first suspicion."""
         for _ in range(SEARCHES):
-            relative = off(self.gaussian, markers, suspect) / self.limit
+            relative = self.expected.off(markers, suspect) / self.limit
             worst = relative.max(axis=1, keepdims=True)
             found = (relative > 1.0) & (suspect | (relative >= NEAR_WORST * worst))
             if (found == suspect).all():
                 return np.asarray(found)
             suspect = found
-        relative = off(self.gaussian, markers, suspect) / self.limit
+        relative = self.expected.off(markers, suspect) / self.limit
         return np.asarray(suspect & (relative > 1.0))
 
     def unsteady(self, markers: FloatArray, strays: BoolArray) -> BoolArray:
         """The runs of strays that are too far off for any pose, or begin or end with a jump."""
-        away = off(self.gaussian, markers, strays)
+        away = self.expected.off(markers, strays)
         steps = np.linalg.norm(np.diff(markers, axis=0), axis=2)
         steps[strays[1:] | strays[:-1]] = np.nan
         usual = np.nan_to_num(quantile(steps.T, FAST), posinf=0.0)
@@ -119,15 +120,13 @@ def _expectation(markers: FloatArray, size: float, change: FloatArray) -> _Expec
     hidden = np.isnan(markers[:, :, 0])
     away = _away_from_place(markers, ~hidden & ~_strange(change, size))
     least = max(FAR * size, FARTHER * float(np.nanquantile(away, ORDINARY)))
-    suspect = _strange(away, size)
+    suspect, parts = _strange(away, size), parts_of(markers)
     for _ in range(ROUNDS):
-        kept = np.where(suspect[:, :, None], np.nan, markers).reshape(len(markers), -1)
-        gaussian = Gaussian.of(kept)
-        smoothed = gaussian.covariance + (NOISE * size) ** 2 * np.eye(len(gaussian.mean))
-        gaussian = Gaussian(gaussian.mean, smoothed)
-        away = off(gaussian, markers, suspect)
+        kept = np.where(suspect[:, :, None], np.nan, markers)
+        expected = Expected.of(kept, parts, NOISE * size)
+        away = expected.off(markers, suspect)
         usual = median(np.where(suspect | hidden, np.nan, away).T)
-        expectation = _Expectation(gaussian, size, np.maximum(least, TIMES * usual))
+        expectation = _Expectation(expected, size, np.maximum(least, TIMES * usual))
         before, suspect = suspect, expectation.strays(markers, suspect)
         suspect &= (hidden | suspect).mean(axis=0) < MOST  # else nothing would be left of it
         if (suspect == before).all():
@@ -141,12 +140,20 @@ def _distances(markers: FloatArray) -> tuple[float, FloatArray]:
     Both are medians over the other markers, which no head motion changes.
     """
     others = markers[:, spread_rows(markers.shape[1], OTHERS)]
+    parts = -(-markers.shape[1] * others.shape[0] * others.shape[1] // AT_ONCE)
+    found = [_changes(part, others) for part in np.array_split(markers, parts, axis=1)]
+    usual = np.concatenate([one for one, _ in found])
+    size = float(np.nanmedian(usual[usual > 0.0])) if (usual > 0.0).any() else 0.0
+    return size, np.concatenate([change for _, change in found], axis=1)
+
+
+def _changes(markers: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Usual distances of markers to others, (M, O), and how much they differ from it, (n, M)."""
     squares = (markers**2).sum(axis=2)[:, :, None] + (others**2).sum(axis=2)[:, None]
     squares -= 2.0 * markers @ others.transpose(0, 2, 1)
     distances = np.sqrt(np.maximum(squares, 0.0))
     usual = median(distances.transpose(1, 2, 0))
-    size = float(np.nanmedian(usual[usual > 0.0])) if (usual > 0.0).any() else 0.0
-    return size, median(np.abs(distances - usual))
+    return usual, median(np.abs(distances - usual))
 
 
 def _away_from_place(markers: FloatArray, kept: BoolArray) -> FloatArray:
