@@ -3,6 +3,7 @@
 The HDF5 library never returns from some of these, or crashes.
 """
 
+import os
 import subprocess
 import sys
 import time
@@ -17,6 +18,7 @@ from facert.data.rig import Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.io.hdf5 import MAX_TEXT, StoredRows, open_guarded
+from facert.io.hdf5_reader.stored_bytes import checksum
 from facert.io.rig import read_rig, write_rig
 from facert.io.take import read_take, write_take
 
@@ -238,14 +240,46 @@ def test_an_index_of_chunks_that_leads_to_itself(path, level):
         guarded.numbers("/data")
 
 
+def test_nodes_that_all_lead_to_one_are_found_in_a_file_of_holes_too(path):
+    with h5py.File(path, "w") as file:
+        file.create_dataset("/data", data=np.arange(10_000.0), chunks=(1,))
+    content = bytearray(path.read_bytes())
+    top = max(nodes(content, 1, 2), default=None) or next(nodes(content, 1, 1))
+    chain = [top, *list(nodes(content, 1, 0))[:6]]
+    for level, (at, below) in enumerate(zip(chain, [*chain[1:], 0], strict=True)):
+        content[at + 5] = len(chain) - 1 - level
+        content[at + 6 : at + 8] = (64 if below else 0).to_bytes(2, "little")
+        for child in range(64):
+            begin = at + 48 + child * 32
+            content[begin : begin + 8] = below.to_bytes(8, "little")
+    path.write_bytes(content)
+    os.truncate(path, 500_000_000)
+    with open_guarded(path) as guarded, pytest.raises(InputError, match="without an end"):
+        guarded.numbers("/data")
+
+
+def test_a_structure_with_a_checksum_is_no_hole(path):
+    with h5py.File(path, "w", libver="v110") as file:
+        file.create_dataset("/data", (1000,), "f8", chunks=(1,))[3] = 1
+    content = bytearray(path.read_bytes())
+    at = content.index(b"FAHD")
+    content[at + 7] = 63  # no pages
+    content[at + 8 : at + 16] = (40_000_000).to_bytes(8, "little")
+    content[at + 24 : at + 28] = checksum(bytes(content[at : at + 24])).to_bytes(4, "little")
+    path.write_bytes(content)
+    os.truncate(path, 500_000_000)
+    with open_guarded(path) as guarded, pytest.raises(InputError, match="bytes of FADB"):
+        guarded.numbers("/data")
+
+
 def test_chunks_that_share_one_place_in_the_index(path):
     with h5py.File(path, "w") as file:
         a_tree(file)
     content = bytearray(path.read_bytes())
-    root, first = next(nodes(content, 1, 1)), next(nodes(content, 1, 0))
-    for child in range(int.from_bytes(content[root + 6 : root + 8], "little")):
-        at = root + 24 + 24 + child * 32
-        content[at : at + 8] = first.to_bytes(8, "little")
+    first, *others = nodes(content, 1, 0)
+    size = 24 + 64 * 32
+    for at in others:
+        content[at : at + size] = content[first : first + size]
     path.write_bytes(content)
     with open_guarded(path) as guarded, pytest.raises(InputError, match="there twice"):
         guarded.numbers("/data")

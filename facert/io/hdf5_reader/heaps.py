@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from facert.io.hdf5_reader.stored_bytes import DamagedError, StoredBytes
 from facert.io.hdf5_reader.trees import new_records
 
@@ -107,8 +109,12 @@ class FractalHeap:
             return self._huge_content(fields.take(min(fields.left, self._file.length_size)))
         raise DamagedError(f"an object {kind} of a heap")
 
+    @cached_property
+    def _huge_records(self) -> list[bytes]:
+        return list(new_records(self._file, self._huge or 0, _HUGE_OBJECTS))
+
     def _huge_content(self, key: bytes) -> bytes:
-        for record in new_records(self._file, self._huge or 0, _HUGE_OBJECTS):
+        for record in self._huge_records:
             fields = self._file.fields_of(record)
             address, length = fields.defined(), fields.length()
             if fields.take(fields.left)[: len(key)] == key:

@@ -53,6 +53,7 @@ def _symbols(file: StoredBytes, tree: int, heap: int) -> Iterator[tuple[bytes, i
         while nodes.left:
             nodes.length()
             at = nodes.defined()
+            file.visit(at)
             head = file.fields(at, 8)
             head.require(b"SNOD")
             head.version(1)

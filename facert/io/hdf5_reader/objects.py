@@ -124,10 +124,17 @@ def _old_header(file: StoredBytes, address: int) -> list[tuple[int, int, bytes]]
             found.append((kind, flags, block.take(size)))
             if kind == CONTINUED:
                 rest = file.fields_of(found[-1][2])
-                blocks.append(file.fields(rest.defined(), rest.length()))
+                blocks.append(file.fields(_next(file, rest), rest.length()))
     if len(found) != count:
         raise DamagedError(f"{len(found)} of {count} messages")
     return found
+
+
+def _next(file: StoredBytes, continuation: Fields) -> int:
+    """The address of a header's next block."""
+    address = continuation.defined()
+    file.visit(address)
+    return address
 
 
 def _new_header(file: StoredBytes, address: int) -> list[tuple[int, int, bytes]]:
@@ -151,5 +158,5 @@ def _new_header(file: StoredBytes, address: int) -> list[tuple[int, int, bytes]]
             found.append((kind, marks, block.take(length)))
             if kind == CONTINUED:
                 rest = file.fields_of(found[-1][2])
-                blocks.append(file.checked(rest.defined(), rest.length(), b"OCHK"))
+                blocks.append(file.checked(_next(file, rest), rest.length(), b"OCHK"))
     return found

@@ -6,6 +6,7 @@ from typing import BinaryIO
 
 _REPEATS = 8
 _SLACK, _FOR_EACH = 2**18, 64
+_MOST_CHECKED = 2**20  # of which the largest sound structure takes half
 
 
 class DamagedError(ValueError):
@@ -17,7 +18,8 @@ class StoredBytes:
 
     Each byte of a sound file is needed once or twice to answer one question, such as for an array.
     So there is an allowance in proportion to the file, and whoever is led in circles, or to the
-    same place again and again, uses it up: no structure has to look out for that itself.
+    same place again and again, uses it up. A file may be large, as holes take no room on a disk:
+    so nodes, which lead to others, are visited once, and what has a checksum is of moderate size.
     """
 
     def __init__(self, file: BinaryIO, size: int) -> None:
@@ -29,6 +31,13 @@ class StoredBytes:
     def renew(self) -> None:
         """Give the whole allowance, for the next question."""
         self._left = _REPEATS * self.size + _SLACK
+        self._visited: set[int] = set()
+
+    def visit(self, address: int) -> None:
+        """Come to a node of a tree or a list; raises `DamagedError` the second time."""
+        if address in self._visited:
+            raise DamagedError("structures that refer to each other without an end")
+        self._visited.add(address)
 
     def read(self, address: int, count: int) -> bytes:
         """Read `count` bytes; raises `DamagedError` for those beyond the file's end."""
@@ -54,6 +63,8 @@ class StoredBytes:
 
     def checked(self, address: int, count: int, signature: bytes) -> Fields:
         """The fields in `count` bytes, which a signature begins and a checksum ends."""
+        if count > _MOST_CHECKED:
+            raise DamagedError(f"{count} bytes of {signature.decode()}")
         found = self.read(address, count)
         if checksum(found[:-4]) != int.from_bytes(found[-4:], "little"):
             raise DamagedError(f"a wrong checksum of {signature.decode()}")

@@ -22,6 +22,7 @@ def old_leaves(file: StoredBytes, address: int, kind: int, key_size: int) -> Ite
     prefix = 8 + 2 * file.offset_size
     while waiting:
         at, expected = waiting.pop()
+        file.visit(at)
         fields = file.fields(at, prefix)
         fields.require(b"TREE")
         found, level, count = fields.number(1), fields.number(1), fields.number(2)
@@ -72,6 +73,7 @@ def _below(file: StoredBytes, tree: _Tree, at: int, count: int, level: int) -> I
     waiting = [(at, count, level)]
     while waiting:
         at, count, level = waiting.pop()
+        file.visit(at)
         size = tree.record_size
         pointer = file.offset_size + tree.leaf_count_size + tree.count_sizes[max(level - 1, 0)]
         used = _PREFIX + count * size + (pointer * (count + 1) if level else 0)
