@@ -6,7 +6,6 @@ import logging
 import os
 import signal
 import sys
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import ModuleType
@@ -176,8 +175,6 @@ for panel, modules in PANELS.items():
 def run() -> None:
     """Run the command line, and exit with what became of it."""
     console.show_any_letter()
-    if not sys.warnoptions:  # lines of code of libraries, as of an overflow, are no messages
-        warnings.simplefilter("ignore")
     try:
         app()
     except Exception as error:

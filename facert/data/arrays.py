@@ -92,10 +92,27 @@ def require_time(time: FloatArray, frames: int, fps: float) -> None:
 def require_sensible(array: FloatArray, path: str) -> None:
     """Refuse numbers that are not finite, or so large that their squares might not be."""
     require_finite(array, path)
-    most = max(array.max(initial=0.0), -array.min(initial=0.0))
+    require_bounded(array, path)
+
+
+def require_bounded(array: FloatArray, path: str) -> None:
+    """Refuse numbers so large that their squares might not be finite; NaN is none of them."""
+    most = max(np.fmax.reduce(array, None, initial=0.0), -np.fmin.reduce(array, None, initial=0.0))
     if most > LARGEST:
-        found = f"up to {most:.1e}"
-        raise InputError(path, "numbers of a sensible size", found, "Check the units.")
+        raise InputError(path, "numbers of a sensible size", f"{most:.1e}", "Check the units.")
+
+
+def single_precision(array: FloatArray, path: str) -> NDArray[np.float32]:
+    """Numbers as float32, in which other programs keep characters.
+
+    Raises `InputError` when one is too large for it.
+    """
+    with np.errstate(over="ignore"):
+        single = array.astype(np.float32)
+    if np.isinf(single).any():
+        found = f"up to {np.abs(array).max():.1e}"
+        raise InputError(path, "numbers that float32 can hold", found, "Check the units.")
+    return single
 
 
 def checked_colours(value: ArrayLike | None, vertices: int) -> FloatArray | None:

@@ -19,6 +19,7 @@ from facert.data.arrays import (
     checked_names,
     float_array,
     frozen,
+    require_bounded,
     require_plain,
     require_sensible,
     require_shape,
@@ -94,7 +95,8 @@ class MeshSequence:
     time : array, shape (T,)
         Seconds, rising.
     fetch : callable
-        From frame numbers, shape (n,), to vertices (n, V, 3); NaN where a frame has no pose.
+        From frame numbers, shape (n,), to vertices (n, V, 3); NaN where a frame has no pose. It
+        raises `InputError` for vertices that are absurdly far away.
     fps : float
         Nominal frames a second.
     start_timecode : str
@@ -110,7 +112,7 @@ class MeshSequence:
     def __post_init__(self) -> None:
         time = float_array(self.time, "/time")
         require_time(time, len(time), self.fps)
-        set_fields(self, time=frozen(time))
+        set_fields(self, time=frozen(time), fetch=_bounded(self.fetch))
 
     def __len__(self) -> int:
         """Number of frames T."""
@@ -120,6 +122,17 @@ class MeshSequence:
         """Iterate over the frames in order as vertices (n, V, 3), at most `size` at once."""
         for start in range(0, len(self), size):
             yield self.fetch(np.arange(start, min(start + size, len(self))))
+
+
+def _bounded(fetch: Callable[[IntArray], FloatArray]) -> Callable[[IntArray], FloatArray]:
+    """The same vertices, none of them absurdly far away."""
+
+    def bounded(frames: IntArray) -> FloatArray:
+        vertices = fetch(frames)
+        require_bounded(vertices, "/vertices")
+        return vertices
+
+    return bounded
 
 
 class Shaped(Protocol):
@@ -198,8 +211,12 @@ class Rig:
         return np.concatenate(clay)
 
     def deform(self, params: FloatArray) -> FloatArray:
-        """Vertices (T, V, 3) of `whole` for parameters (T, P)."""
+        """Vertices (T, V, 3) of `whole` for parameters (T, P); NaN where these are.
+
+        Raises `InputError` for parameters of absurd size.
+        """
         flat, params = self.shapes.reshape(len(self.shapes), -1), np.asarray(params)
+        require_bounded(params, "the rig's parameters")
         vertices = self.neutral + (params @ flat).reshape(-1, *self.neutral.shape)
         if self.body is not None:
             body = np.broadcast_to(self.body.vertices, (len(vertices), *self.body.vertices.shape))

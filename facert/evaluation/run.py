@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -51,6 +51,7 @@ def run(
     settings: Settings | None = None,
     jobs: int = 1,
     journal: Journal | None = None,
+    begin: Callable[[], object] | None = None,
 ) -> Iterator[Outcome]:
     """Evaluate the cells of a grid; outcomes come as they are done.
 
@@ -65,6 +66,8 @@ def run(
     journal : Journal, optional
         Cells that it holds are not evaluated again; others are added to it, but for those that
         failed unexpectedly: the next run tries them again.
+    begin : callable, optional
+        Called first in every process of its own.
 
     Raises
     ------
@@ -80,7 +83,7 @@ def run(
     done = {outcome.cell for outcome in kept}
     waiting = [cell for cell in cells if cell not in done]
     calls = [(problem, cell, settings) for cell in waiting]
-    for outcome in call_each(evaluate, calls, jobs, lost=_lost):
+    for outcome in call_each(evaluate, calls, jobs, begin, _lost):
         if outcome.details:
             log.debug("%s\n%s", outcome.cell, outcome.details)
         elif journal is not None:

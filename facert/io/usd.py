@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from facert.data.arrays import single_precision
 from facert.data.units import in_metres
 from facert.data.version import CREATED_BY, MARK
 from facert.errors import FacertError, InputError
@@ -127,7 +128,9 @@ def _animation(stage: Any, morphs: Morphs, tokens: list[str]) -> Any:
     animation.CreateBlendShapesAttr(tokens)
     weights = animation.CreateBlendShapeWeightsAttr()
     frames = (morphs.time - morphs.time[0]) * morphs.fps
-    for frame, row in zip(frames.tolist(), morphs.weights.astype(np.float32), strict=True):
+    for frame, row in zip(
+        frames.tolist(), single_precision(morphs.weights, "weights"), strict=True
+    ):
         weights.Set(Vt.FloatArray.FromNumpy(row), frame)
     return animation
 
@@ -181,7 +184,7 @@ def _identifiers(names: tuple[str, ...]) -> list[str]:
 def _vectors(values: Any) -> Any:
     from pxr import Vt
 
-    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, dtype=np.float32))
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(single_precision(values, "vertices")))
 
 
 def _int32(values: Any) -> Any:

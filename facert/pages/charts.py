@@ -9,7 +9,7 @@ import numpy as np
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
 from facert.errors import escaped
-from facert.render.faces import INK
+from facert.render.faces import INK, require_deviations, require_poses
 from facert.render.plots import CURVE, TRUTH
 
 if TYPE_CHECKING:
@@ -38,16 +38,16 @@ class Chart:
         self, server: ViserServer, take: Take, truth: FloatArray | None, control: int
     ) -> None:
         assert take.controls is not None  # the caller has seen poses
-        assert take.params is not None
-        self._values, self._time = take.params[:, control], take.time
+        self._values, self._time = require_poses(take)[:, control], take.time
         posed = take.labels
         self._frames = posed[np.unique(np.linspace(0, len(posed) - 1, MOST).astype(int))]
         curves = {"pose": self._values}
         if truth is not None:
             curves = {"truth": truth[:, control]} | curves
-        if take.std is not None:
-            curves["+ 2 std"] = self._values + 2 * take.std[:, control]
-            curves["- 2 std"] = self._values - 2 * take.std[:, control]
+        std = require_deviations(take)
+        if std is not None:
+            curves["+ 2 std"] = self._values + 2 * std[:, control]
+            curves["- 2 std"] = self._values - 2 * std[:, control]
         self._curves = tuple(values[self._frames] for values in curves.values())
         self._chart = self._plot(server, take.controls.names[control], list(curves))
         self.move(0)

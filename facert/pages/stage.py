@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray, require_bounded
 from facert.data.rig import Mesh
 from facert.data.take import Source
 from facert.mesh.caps import caps_of
@@ -58,6 +58,7 @@ class Part:
 
     def _fit(self, points: FloatArray) -> None:
         """Scale it to points (n, 3)."""
+        require_bounded(points, "/source/markers")
         camera = frame_mesh(points)
         self._centre, self._scale = np.array(camera.centre), 0.5 / max(camera.reach, 1e-9)
         self.width = float(np.ptp(points[:, 0])) * self._scale

@@ -16,7 +16,7 @@ from facert.data.take import Take
 from facert.errors import InputError
 from facert.evaluation.metrics import vertex_errors, vertex_gram
 from facert.pages.paint import Scale
-from facert.render.faces import Face, posed_face
+from facert.render.faces import Face, posed_face, require_deviations, require_poses
 
 if TYPE_CHECKING:
     from facert.retarget.retargeter import Retargeter
@@ -45,6 +45,10 @@ class Performance:
     """True poses of the same frames."""
 
     def __post_init__(self) -> None:
+        for take in (self.take, self.truth):
+            if take is not None and len(take.labels):
+                require_poses(take)
+                require_deviations(take)
         if self.truth is None:
             return
         fix = "Give the truth of this take."

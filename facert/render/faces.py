@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, require_bounded
 from facert.data.drivers import require_used
 from facert.data.names import NameIndex, shape_drivers
 from facert.data.rig import MeshSequence, Rig
@@ -97,6 +97,7 @@ def actor_face(take: Take, rig: Rig) -> Face:
     if not known:
         raise _misfit("shapes for the take's weights", f"none for {take.source.names[0]!r}")
     columns = [take.source.names.index(name) for name in known]
+    require_bounded(take.source.values, "/source/weights")
     weights = np.nan_to_num(take.source.values[:, columns]) @ shape_drivers(known, rig.names)
     return driven_face(take, rig, weights)
 
@@ -147,12 +148,20 @@ def control_settings(take: Take, rig: Rig, frames: Sequence[int]) -> FloatArray:
 
 
 def require_poses(take: Take) -> FloatArray:
-    """The take's poses (T, P); raises InputError when it has none."""
+    """The take's poses (T, P); raises InputError when it has none, or any of absurd size."""
     if take.params is None or not len(take.labels):
         raise InputError(
             "/target/params", "poses of the character", "none", "Give a take that was retargeted."
         )
+    require_bounded(take.params, "/target/params")
     return take.params
+
+
+def require_deviations(take: Take) -> FloatArray | None:
+    """Standard deviations of the poses (T, P), if known; raises InputError for absurd sizes."""
+    if take.std is not None:
+        require_bounded(take.std, "/target/std")
+    return take.std
 
 
 def outline(motion: MeshSequence) -> FloatArray:

@@ -13,7 +13,7 @@ from facert.data.names import fitting_some
 from facert.data.take import Take
 from facert.data.text import printable
 from facert.errors import InputError
-from facert.render.faces import INK, require_poses
+from facert.render.faces import INK, require_deviations, require_poses
 from facert.render.texts import with_plain_texts
 
 if TYPE_CHECKING:
@@ -98,8 +98,9 @@ def _number_frames(axes: Axes, take: Take) -> None:
 
 def _draw_curve(axes: Axes, take: Take, column: int) -> None:
     values = require_poses(take)[:, column]
-    if take.std is not None:
-        band = 2 * take.std[:, column]
+    std = require_deviations(take)
+    if std is not None:
+        band = 2 * std[:, column]
         axes.fill_between(
             take.time, values - band, values + band, color=CURVE, alpha=0.2, lw=0, label="± 2 std"
         )

@@ -99,8 +99,8 @@ def _hits(corners: FloatArray, area: FloatArray, size: int) -> _Hits:
     slopes = ((by - cy) * inverse)[face], ((cy - ay) * inverse)[face]
     starts = y * ((cx - bx) * inverse)[face], y * ((ax - cx) * inverse)[face]
     low, high = _span(slopes, starts)
-    left = np.maximum(np.ceil(low + cx[face]), 0).astype(np.int64)
-    right = np.minimum(np.floor(high + cx[face]), size - 1).astype(np.int64)
+    left = np.clip(np.ceil(low + cx[face]), 0, size).astype(np.int64)
+    right = np.clip(np.floor(high + cx[face]), -1, size - 1).astype(np.int64)
     count = np.maximum(right - left + 1, 0)
     line = np.repeat(np.arange(len(face)), count)
     column = left[line] + _counted(count)

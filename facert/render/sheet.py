@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, require_bounded
 from facert.data.moments import frame_label
 from facert.data.rig import Mesh, Rig
 from facert.data.take import Take
@@ -230,6 +230,7 @@ def _draw_markers(
     `room` is half the height shown, in their largest extent. With `rings`, lines come from hollow
     rings where each marker mostly is.
     """
+    require_bounded(markers, "/source/markers")
     markers = markers[:, ~np.isnan(markers).all(axis=(0, 2))]
     rest = np.nanmedian(markers, axis=0)
     low, high = (bound(markers, axis=(0, 1)) for bound in (np.nanmin, np.nanmax))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -76,3 +78,21 @@ def test_a_limit_of_memory_that_is_none_is_told(facert):
     refused = facert("inspect", "no.h5", "--max-memory", "much")
     assert refused.code == 3
     assert refused.err.startswith("error: --max-memory: expected a size such as 500M or 4G")
+
+
+@pytest.mark.filterwarnings("always")
+def test_what_libraries_warn_of_is_a_detail_on_one_line(facert, make_take, monkeypatch, tmp_path):
+    facts = inspect._facts
+
+    def warned(*given):
+        warnings.warn("an overflow\x1b[31m\nsecond line", RuntimeWarning, stacklevel=1)
+        logging.getLogger("library").error("lost\x1b[31m\nsecond line")
+        return facts(*given)
+
+    take = tmp_path / "take.h5"
+    write_take_file(make_take(), take)
+    monkeypatch.setattr(inspect, "_facts", warned)
+    assert facert("inspect", take).err == ""
+    first, second = facert("inspect", take, "-v").err.splitlines()
+    assert first.startswith(r"RuntimeWarning: an overflow\x1b[31m\nsecond line (test_app.py, line ")
+    assert second == r"library: lost\x1b[31m\nsecond line"

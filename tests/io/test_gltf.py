@@ -17,6 +17,7 @@ from facert.data.labelling import weights_as_poses
 from facert.data.rig import Rig
 from facert.errors import InputError
 from facert.io.formats import read_mesh
+from facert.io.gltf.buffer import Buffer
 from facert.io.gltf.rig import read_gltf_mesh, read_gltf_rig
 from facert.io.gltf.take import kind_of, read_gltf_take
 from facert.io.gltf.writer import write_glb
@@ -271,3 +272,9 @@ def test_a_mesh_that_is_no_face_s_size_in_metres_is_logged(tmp_path, caplog, sca
     builder.mesh(TRIANGLE, {"smile": SMILE}, scale=[scale] * 3)
     read_gltf_rig(builder.save(tmp_path / "face.glb"))
     assert ("--in-units" in caplog.text) == told
+
+
+def test_what_float32_cannot_hold_is_not_written() -> None:
+    for add in (Buffer().vertices, Buffer().keys):
+        with pytest.raises(InputError, match="numbers that float32 can hold"):
+            add(np.array([[0.0, 1e39, 0.0]]))

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from facert.data.take import Source
+from facert.errors import InputError
 from facert.io.formats import read_take_file
 from facert.preprocess.faults import (
     exchanged,
@@ -33,6 +34,16 @@ def test_gaps_and_noise_are_no_faults(face):
     noisy = face + 0.05 * rng.normal(size=face.shape)
     noisy[rng.random(face.shape[:2]) < 0.3] = np.nan
     assert find_faults(source(noisy)).any.mean() < 1e-3
+
+
+@pytest.mark.parametrize("scale", [1e20, 1e150, 1e300])
+def test_a_take_of_absurd_size_is_refused_before_anything_is_searched(face, scale):
+    for values in (face * scale, face[:, :, 0] * scale):
+        with pytest.raises(InputError, match=r"/source/(markers|weights): expected numbers of a"):
+            find_faults(source(values))
+    spiked = face.copy()
+    spiked[3, 2] = scale
+    assert find_faults(source(spiked)).any[3, 2]
 
 
 def test_the_origin_is_no_place_for_a_marker(face):

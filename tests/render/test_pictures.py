@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facert.data.rig import Rig
+from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.mesh.normals import vertex_normals
@@ -187,3 +187,41 @@ def test_a_picture_has_its_bounds() -> None:
         plot_controls(TAKE, names=["up"] * 41)
     with pytest.raises(InputError, match="--frames: expected at most 40"):
         render_sheet([FACE], [0] * 41)
+
+
+@pytest.mark.parametrize("size", [1e16, 1e300, -1.7e308])
+@pytest.mark.parametrize("entry", [(3, 1), ...])
+def test_poses_of_absurd_size_are_refused_by_name(size, entry):
+    params = np.array(TAKE.params)
+    params[entry] = size
+    absurd = take_with(params)
+    drawn = (
+        lambda: posed_face(absurd, RIG, "character"),
+        lambda: plot_controls(absurd),
+        lambda: plot_controls(dataclasses.replace(TAKE, std=np.abs(params))),
+        lambda: plot_controls(TAKE, absurd),
+    )
+    for draw in drawn:
+        with pytest.raises(InputError, match=r"target/(params|std): expected numbers of a sens"):
+            draw()
+    with pytest.raises(InputError, match="the rig's parameters"):
+        RIG.deform(params)
+
+
+def test_markers_and_vertices_of_absurd_size_are_refused_by_name():
+    far = np.array(TAKE.source.values)
+    far[2, 1, 0] = 1e300
+    spiked = dataclasses.replace(TAKE, source=Source(far, TAKE.source.names))
+    with pytest.raises(InputError, match="/source/markers"):
+        render_sheet([FACE], [0], spiked)
+    sequence = MeshSequence(RIG.mesh, TAKE.time, lambda _: np.full((1, 4, 3), 1e300))
+    with pytest.raises(InputError, match="/vertices"):
+        sequence.fetch(np.arange(1))
+
+
+@pytest.mark.parametrize("size", [1e12, 1e20, 1e60])
+def test_triangles_far_beyond_a_picture_are_drawn_within_it(size):
+    pixels = SQUARE * [size, size, 1.0] + [size / 3, size / 7, 0.0]
+    surface = rasterise(pixels, SQUARE, np.ones((4, 3)), FRONT, 16)
+    assert np.isfinite(surface.depth).all()
+    assert surface.covered.shape == (16, 16)

@@ -194,7 +194,7 @@ def _run(
     from facert.evaluation.run import run
 
     try:
-        outcomes = run(problem, grid, settings, jobs or cores(), journal)
+        outcomes = run(problem, grid, settings, jobs or cores(), journal, console.like_here())
         done = list(watched(outcomes, len(grid.cells), "cells"))
     except KeyboardInterrupt as stop:
         if journal is not None:

@@ -46,6 +46,7 @@ def command(
         require_poses(take)
     if truth_path and truth:
         with reading(truth_path):
+            require_poses(truth)
             take, truth = _comparable(take, truth, names)
     with reading(take_path):
         figure = plot_controls(take, truth, names)

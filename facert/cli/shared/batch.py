@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -111,8 +110,8 @@ def carry_out(
     else:
         wanted, failed = _writable(todo.pairs, overwrite)
         there = len(todo.pairs) - len(wanted) - failed
-        calls, begin = [(work, *pair) for pair in wanted], partial(_begin, console.log.level)
-        for file, thing, error in call_each(_attempt, calls, todo.jobs, begin, _lost):
+        calls = [(work, *pair) for pair in wanted]
+        for file, thing, error in call_each(_attempt, calls, todo.jobs, console.like_here(), _lost):
             failed += error is not None
             console.show(f"failed  {error}" if error else f"done    {file}")
             if error is None:
@@ -161,12 +160,6 @@ def _require_single(source: Path, output: Path, overwrite: bool, kinds: tuple[Ki
         if not error.fix.endswith(SWAPPED):
             error.fix = f"{error.fix.removesuffix('.')}; for two takes, --out-dir DIR."
         raise
-
-
-def _begin(level: int) -> None:
-    """Set a worker process to log as much as the first one."""
-    console.configure(quiet=False, verbose=False)
-    console.log.setLevel(level)
 
 
 def _attempt(work: Work[Any], source: Path, output: Path) -> tuple[Path, Any, str | None]:

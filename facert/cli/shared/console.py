@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable, Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from io import TextIOWrapper
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -114,11 +117,48 @@ def cell(text: str) -> Text:
     return Text(escaped(text))
 
 
+class _LibrariesHandler(logging.Handler):
+    """Log handler that makes what libraries log details of facert's own log."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not record.name.startswith("facert"):
+            log.debug("%s: %s", record.name, record.getMessage())
+
+
+def _log_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,  # noqa: ARG001  where Python would write it
+    line: str | None = None,  # noqa: ARG001
+) -> None:
+    """Log a warning of Python code, as of an overflow: it is a detail, and no message to people."""
+    log.debug("%s: %s (%s, line %d)", category.__name__, message, Path(filename).name, lineno)
+
+
 def configure(quiet: bool, verbose: bool) -> None:
-    """Send the package's log to stderr: warnings only, notes (default) or details."""
+    """Send the package's log to stderr: warnings only, notes (default) or details.
+
+    What libraries warn of is among the details.
+    """
     show_any_letter()
+    warnings.showwarning = _log_warning
+    root = logging.getLogger()
+    if not any(isinstance(handler, _LibrariesHandler) for handler in root.handlers):
+        root.addHandler(_LibrariesHandler())
     log.handlers[:] = [_StderrHandler()]
     log.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+
+
+def like_here() -> Callable[[], None]:
+    """What lets a worker process log as much as this one."""
+    return partial(_configure_worker, log.level)
+
+
+def _configure_worker(level: int) -> None:
+    configure(quiet=False, verbose=False)
+    log.setLevel(level)
 
 
 def show_any_letter() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, single_precision
 from facert.errors import InputError
 from facert.io.atomic import writing
 from facert.io.gltf.container import BINARY, JSON, MAGIC
@@ -68,11 +68,11 @@ class Buffer:
 
     def vertices(self, values: FloatArray) -> int:
         """Append something of every vertex, (V, 3)."""
-        return self.add(values.astype("<f4"), _VERTICES)
+        return self.add(single_precision(values, "vertices"), _VERTICES)
 
     def keys(self, values: FloatArray) -> int:
         """Append numbers of an animation: vectors (T, 3) or (T, 4), or others (T,)."""
-        return self.add(values.astype("<f4"))
+        return self.add(single_precision(values, "keys"))
 
     def corners(self, faces: IntArray) -> int:
         """Append triangles (F, 3)."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from facert.data.arrays import FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray, require_bounded
 from facert.data.take import Source, Take
 from facert.preprocess.cache import keep_last
 from facert.preprocess.faults.absurd import absurd_positions, absurd_weights
@@ -42,7 +42,14 @@ def find_faults(source: Source, posed: IntArray | None = None) -> Faults:
     -------
     Faults
         An entry that was not observed is no fault.
+
+    Raises
+    ------
+    InputError
+        When most of the source is so large that nothing can be computed with it.
     """
+    usual = float(np.nanmedian(np.abs(source.values)))
+    require_bounded(np.array([usual]), f"/source/{source.kind}")
     values = np.clip(source.values, -LARGEST, LARGEST)
     return _of_markers(values) if source.kind == "markers" else _of_weights(values, posed)
 
