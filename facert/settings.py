@@ -110,7 +110,7 @@ class Settings:
     ] = "lbfgs"
     tolerance: Annotated[
         float, About("Training ends when an iteration gains less than this, relative.", FINE, 0)
-    ] = 1e-6
+    ] = 1e-8
     max_iterations: Annotated[int, About("Iterations at most.", FINE, 1)] = 2000
     checkpoint_every: Annotated[
         int, About("Iterations between stages, at which L-BFGS begins anew.", FINE, 1)

@@ -21,6 +21,10 @@ from facert.models.kernels import squared_exponential
 INVERSE_WIDTHS = (0.01, 0.05, 0.25)
 PENALTIES = (1.0, 30.0, 1000.0)
 TUBES = (0.02, 0.1)
+# Digits after the point of kernels and standardised poses. The search for a machine takes its next
+# pair of labels by comparing numbers, and ends at a tolerance of 1e-3: what rounding has done to
+# the last digits would decide which pair it is, and move poses by a few 1e-4.
+DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +76,10 @@ class SVR(SupervisedRegression):
         squared = cdist(X, X, "sqeuclidean")
         # Labels that are all the same have no width of their own.
         inverse_widths = np.array(INVERSE_WIDTHS) / (float(squared.mean()) or 1.0)
-        kernels = squared_exponential(squared, 2.0 * inverse_widths[:, None, None])
+        kernels = squared_exponential(squared, 2.0 * inverse_widths[:, None, None]).round(DIGITS)
         mean, scale = Y.mean(axis=0), Y.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)  # a control that never moves
-        T = (Y - mean) / scale
+        T = ((Y - mean) / scale).round(DIGITS)
 
         duals, offset = np.zeros((len(kernels), *Y.shape)), np.empty(Y.shape[1])
         with sklearn.config_context(assume_finite=True, skip_parameter_validation=True):

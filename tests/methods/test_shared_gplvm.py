@@ -151,7 +151,7 @@ def test_the_optimiser_is_the_one_of_the_settings(name, kind, monkeypatch):
     used, train = [], shared_gplvm.train
 
     def note(module, optimiser, **options):
-        used.append(type(optimiser))
+        used.append(type(optimiser.inner))
         return train(module, optimiser, **options)
 
     monkeypatch.setattr(shared_gplvm, "train", note)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+from torch import nn
+
 from facert.errors import InputError, NumericalError
-from facert.models.gplvm.module import SharedGPLVM
 from facert.models.optim.flat import FlatObjective
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import Optimiser, Result, State, Status
 
 
 def train(
-    module: SharedGPLVM,
+    module: nn.Module,
     optimiser: Optimiser,
     *,
     tolerance: float,
@@ -28,7 +29,7 @@ def train(
 
     Parameters
     ----------
-    module : SharedGPLVM
+    module : Module
         Begins at its present parameters, or at the monitor's checkpoint.
     optimiser : Optimiser
         How to descend.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from torch import Tensor, nn
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.models.closed_form import closed_form
+from facert.models.gp.curvature import likelihood_hessian
 from facert.models.gp.likelihood import compact_factor, negative_log_likelihood
 from facert.models.gp.posterior import Posterior, Predictor
 from facert.models.gplvm.prior import latent_precision, product
@@ -66,6 +68,22 @@ class GaussianView(nn.Module):
         with torch.no_grad():
             self.log_kernel.copy_(torch.from_numpy(kernel.to_log(self.noise_floor)))
 
+    def follow_scale(self, scale: float) -> None:
+        """Stay the same process while the latents are divided by `scale`."""
+        with torch.no_grad():
+            self.log_kernel[1] += 2.0 * math.log(scale)
+
+    def hessian(self, Z: FloatArray) -> FloatArray:
+        """Second derivatives of minus the log-likelihood in Z (n, q) and the log-kernel."""
+        return likelihood_hessian(
+            Z,
+            self.log_kernel.detach().cpu().numpy(),
+            self.factor.cpu().numpy(),
+            self.columns,
+            self.noise_floor,
+            self.kernel_type,
+        )
+
     @property
     def kernel(self) -> Kernel:
         """The kernel with its present parameters."""
@@ -113,7 +131,23 @@ class SharedGPLVM(nn.Module):
         """The objective, Eq. (4), and its gradient in each parameter."""
         Z = self.Z.detach()
         dZ = product(self.precision, Z)
-        value, gradient = 0.5 * torch.dot(Z.view(-1), dZ.view(-1)) + self._prior_constant, [dZ]
+        return self._with_views(0.5 * torch.dot(Z.view(-1), dZ.view(-1)), dZ)
+
+    def scale_free(self) -> list[Tensor]:
+        """Value and gradient of the objective whose prior sees latents of mean square 1.
+
+        See `facert.models.gplvm.scale_free`.
+        """
+        Z = self.Z.detach()
+        square = Z.square().mean()
+        dZ = product(self.precision, Z) / square
+        twice = torch.dot(Z.view(-1), dZ.view(-1))
+        return self._with_views(0.5 * twice, dZ - twice / (square * Z.numel()) * Z)
+
+    def _with_views(self, exponent: Tensor, dZ: Tensor) -> list[Tensor]:
+        """The prior's exponent and its gradient, with its constant and the views added."""
+        Z = self.Z.detach()
+        value, gradient = exponent + self._prior_constant, [dZ]
         # On the CPU NumPy takes and adds rows in half the time.
         on_cpu = Z.device.type == "cpu"
         places: Any = Z.numpy() if on_cpu else Z
@@ -125,6 +159,19 @@ class SharedGPLVM(nn.Module):
             slopes[rows] += own.numpy() if on_cpu else own
             gradient += others
         return [value, *gradient]
+
+    def gradient_norm(self) -> float:
+        """Length of the objective's gradient."""
+        _, *gradient = self.value_and_gradient()
+        return math.hypot(*(float(part.norm()) for part in gradient))
+
+    def rescale(self) -> None:
+        """Bring the latents to mean square 1, and the kernels' widths with them."""
+        with torch.no_grad():
+            scale = self.Z.square().mean().sqrt().item()
+            self.Z /= scale
+            for view in (self.source, self.target):
+                view.follow_scale(scale)
 
     def latents(self, view: GaussianView) -> FloatArray:
         """Latent coordinates of a view's rows."""

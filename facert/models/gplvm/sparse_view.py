@@ -73,6 +73,12 @@ class SparseView(GaussianView):
         )
         return value, dZ, d_log_kernel, dU
 
+    def follow_scale(self, scale: float) -> None:
+        """See `GaussianView`; the inducing latents go with the others."""
+        super().follow_scale(scale)
+        with torch.no_grad():
+            self.inducing /= scale
+
     def posterior(self, latents: FloatArray) -> Predictor:
         """The process given its observations, seen from the inducing latents."""
         return sparse_posterior(

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from facert.data.arrays import FloatArray
 from facert.errors import NumericalError
+from facert.models.optim.arrow import Arrow
 
 
 class ClosedForm(Protocol):
@@ -63,6 +64,16 @@ class FlatObjective:
         if not (np.isfinite(value.item()) and np.isfinite(flat).all()):
             return np.inf, np.zeros_like(x)
         return float(value.item()), flat
+
+    def curvature(self, x: FloatArray) -> Arrow | None:
+        """The Hessian at x; None of a module that does not know it, or where it is not there."""
+        self.vector = x
+        if not hasattr(self.module, "curvature"):
+            return None
+        try:
+            return cast("Arrow | None", self.module.curvature())
+        except NumericalError:
+            return None
 
     def _value_and_gradient(self) -> Sequence[Tensor]:
         if hasattr(self.module, "value_and_gradient"):

@@ -1,0 +1,153 @@
+"""A search in stages, each in variables in which the curvature where it begins is the identity.
+
+The shared model is badly conditioned: conjugate gradients and L-BFGS take hundreds of iterations,
+on the way of which rounding grows a billionfold, so that they end somewhere else on every machine.
+With the Hessian at the beginning of each stage, H + shift = L Lᵀ, and y = Lᵀ x in place of x, a few
+dozen iterations reach the end, and rounding has no time to grow. The first stage goes without: far
+from the end the Hessian soon means nothing, and its iterations are cheap.
+
+Where the watcher ends the run the gradient is small, and not yet zero. Newton's method for a zero
+of the gradient then leads to the same point from wherever near it the run has ended.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from facert.data.arrays import FloatArray
+from facert.models.optim.arrow import Arrow, ArrowFactor
+from facert.models.optim.optimiser import Objective, Optimiser, State, Watcher
+
+FIRST, STAGE = 40, 20  # iterations of the first stage, and of each other
+LAST = 6  # steps of Newton's method at the end, at most
+SHORTER = (1.0, 0.5, 0.25, 0.1)  # of a step, where the gradient has grown after it
+SETTLED = 1e-6  # a longest step of any variable after which no other is needed
+# Added to the Hessian, relative to its diagonal, until it is positive definite. The least keeps
+# directions out in which nothing changes, such as rotations of latent coordinates.
+SHIFTS = tuple(10.0**power for power in range(-6, 4))
+
+
+@runtime_checkable
+class Curved(Protocol):
+    """An objective that knows its second derivatives."""
+
+    def curvature(self, x: FloatArray) -> Arrow | None:
+        """The Hessian at x; None where it cannot be had."""
+        ...
+
+
+class Conditioned:
+    """An optimiser in conditioned variables; in plain ones where the objective is not `Curved`.
+
+    A stage does not know of the one before, so that a run that is resumed where a stage ended goes
+    on as if it had not stopped.
+
+    Parameters
+    ----------
+    inner : Optimiser
+        How to descend within a stage.
+    """
+
+    def __init__(self, inner: Optimiser) -> None:
+        self.inner = inner
+
+    def start(self, objective: Objective, x: FloatArray) -> State:
+        """The state before the first iteration."""
+        return self.inner.start(objective, x)
+
+    def advance(self, objective: Objective, state: State, iterations: int, watch: Watcher) -> State:
+        """Run at most so many further iterations; `watch` sees each and may end the run."""
+        end, watched = state.iterations + iterations, _Watched(watch)
+        while state.iterations < end and not watched.over:
+            left, first = end - state.iterations, FIRST - state.iterations
+            if first > 0 and not state.stalled:
+                state = self.inner.advance(objective, state, min(first, left), watched)
+                continue
+            factor = _factor(objective, state.x)
+            if factor is None:
+                return state if state.stalled else self._plain(objective, state, left, watched)
+            before = state.value
+            state = self._stage(objective, factor, state, min(STAGE, left), watched)
+            if state.stalled and not state.value < before:
+                break
+        return _settled(objective, state, watch) if watched.over else state
+
+    def _plain(self, objective: Objective, state: State, left: int, watch: Watcher) -> State:
+        if not state.memory:  # a conditioned stage leaves none
+            began = self.inner.start(objective, state.x)
+            state = State(state.x, state.value, state.gradient_norm, state.iterations, began.memory)
+        return self.inner.advance(objective, state, left, watch)
+
+    def _stage(
+        self, objective: Objective, factor: ArrowFactor, state: State, left: int, watch: Watcher
+    ) -> State:
+        stage = _Stage(objective, factor, state)
+        began = self.inner.start(stage.evaluate, np.zeros_like(state.x))
+        began = State(began.x, state.value, began.gradient_norm, state.iterations, began.memory)
+        ended = self.inner.advance(stage.evaluate, began, left, lambda s: watch(stage.restored(s)))
+        return stage.restored(ended)
+
+
+class _Watched:
+    """A watcher that remembers whether the run is over."""
+
+    def __init__(self, watch: Watcher) -> None:
+        self.watch, self.over = watch, False
+
+    def __call__(self, state: State) -> bool:
+        self.over = self.watch(state)
+        return self.over
+
+
+class _Stage:
+    """The objective in the variables of a stage, and its states in those of the run."""
+
+    def __init__(self, objective: Objective, factor: ArrowFactor, began: State) -> None:
+        self.objective, self.factor, self.began = objective, factor, began
+        self._norms: dict[bytes, float] = {}  # of the gradients since the last iteration
+
+    def evaluate(self, y: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = self.objective(self.began.x + self.factor.restore(y))
+        self._norms[y.tobytes()] = float(np.linalg.norm(gradient))
+        return value, self.factor.whiten(gradient)
+
+    def restored(self, state: State) -> State:
+        norm = self._norms.get(state.x.tobytes(), self.began.gradient_norm)
+        self._norms = {state.x.tobytes(): norm}
+        x = self.began.x + self.factor.restore(state.x)
+        return State(x, state.value, norm, state.iterations, stalled=state.stalled)
+
+
+def _settled(objective: Objective, state: State, watch: Watcher) -> State:
+    """The zero of the gradient beside a state; the state itself after the first stage alone."""
+    if state.iterations <= FIRST or not isinstance(objective, Curved):
+        return state
+    _, gradient = objective(state.x)
+    for _ in range(LAST):
+        hessian = objective.curvature(state.x)
+        if hessian is None:
+            break
+        step = hessian.solve(gradient, SHIFTS[0])
+        for share in SHORTER:
+            x = state.x - share * step
+            value, there = objective(x)
+            norm = float(np.linalg.norm(there))
+            if np.isfinite(value) and norm < state.gradient_norm:
+                break
+        else:
+            break
+        gradient, state = there, State(x, value, norm, state.iterations + 1)
+        watch(state)
+        if np.abs(step).max() < SETTLED:
+            break
+    return state
+
+
+def _factor(objective: Objective, x: FloatArray) -> ArrowFactor | None:
+    hessian = objective.curvature(x) if isinstance(objective, Curved) else None
+    if hessian is None:
+        return None
+    factors = (hessian.factor(shift) for shift in SHIFTS)
+    return next((factor for factor in factors if factor is not None), None)
