@@ -126,4 +126,5 @@ def _of_kernel(at: _Expansion, dK: list[FloatArray]) -> FloatArray:
     hessian: FloatArray = np.einsum("aij,bji->ab", by_P, by_C)
     of_width = at.k2 * at.squared**2 + dK[1]
     first, mixed, second, noise = (float(np.vdot(at.G, D)) for D in (dK[0], dK[1], of_width, dK[2]))
-    return hessian + np.array([[first, mixed, 0.0], [mixed, second, 0.0], [0.0, 0.0, noise]])
+    hessian += np.array([[first, mixed, 0.0], [mixed, second, 0.0], [0.0, 0.0, noise]])
+    return hessian

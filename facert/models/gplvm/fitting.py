@@ -75,10 +75,11 @@ def train(
         nonlocal progress, due
         progress = Progress(state, (*progress.curve, state.value))
         monitor.iteration(state)
-        if time.perf_counter() >= due:
+        over = converged()  # what is over is not checkpointed within: resumed, it would go on
+        if not over and time.perf_counter() >= due:
             monitor.checkpoint(progress)
             due = time.perf_counter() + checkpoint_seconds
-        return converged()
+        return over
 
     status: Status = "iteration limit"
     try:

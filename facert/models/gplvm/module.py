@@ -169,7 +169,7 @@ class SharedGPLVM(nn.Module):
         """Bring the latents to mean square 1, and the kernels' widths with them."""
         with torch.no_grad():
             scale = self.Z.square().mean().sqrt().item()
-            self.Z /= scale
+            self.Z.div_(scale)
             for view in (self.source, self.target):
                 view.follow_scale(scale)
 

@@ -77,7 +77,7 @@ class SparseView(GaussianView):
         """See `GaussianView`; the inducing latents go with the others."""
         super().follow_scale(scale)
         with torch.no_grad():
-            self.inducing /= scale
+            self.inducing.div_(scale)
 
     def posterior(self, latents: FloatArray) -> Predictor:
         """The process given its observations, seen from the inducing latents."""

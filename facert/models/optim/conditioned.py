@@ -12,6 +12,7 @@ of the gradient then leads to the same point from wherever near it the run has e
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -41,8 +42,8 @@ class Curved(Protocol):
 class Conditioned:
     """An optimiser in conditioned variables; in plain ones where the objective is not `Curved`.
 
-    A stage does not know of the one before, so that a run that is resumed where a stage ended goes
-    on as if it had not stopped.
+    A stage does not know of the one before, and states within one remember where it began, so that
+    a run that is resumed from any of them goes on as if it had not stopped.
 
     Parameters
     ----------
@@ -61,6 +62,9 @@ class Conditioned:
         """Run at most so many further iterations; `watch` sees each and may end the run."""
         end, watched = state.iterations + iterations, _Watched(watch)
         while state.iterations < end and not watched.over:
+            if "stage" in state.memory:
+                state = self._resume(objective, state, end, watched)
+                continue
             left, first = end - state.iterations, FIRST - state.iterations
             if first > 0 and not state.stalled:
                 state = self.inner.advance(objective, state, min(first, left), watched)
@@ -72,7 +76,7 @@ class Conditioned:
             state = self._stage(objective, factor, state, min(STAGE, left), watched)
             if state.stalled and not state.value < before:
                 break
-        return _settled(objective, state, watch) if watched.over else state
+        return _settled(objective, state) if watched.over else state
 
     def _plain(self, objective: Objective, state: State, left: int, watch: Watcher) -> State:
         if not state.memory:  # a conditioned stage leaves none
@@ -80,13 +84,27 @@ class Conditioned:
             state = State(state.x, state.value, state.gradient_norm, state.iterations, began.memory)
         return self.inner.advance(objective, state, left, watch)
 
+    def _resume(self, objective: Objective, state: State, end: int, watch: Watcher) -> State:
+        value, norm, iterations, inner_norm = state.memory["of_stage"].tolist()
+        began = State(state.memory["stage"], value, norm, int(iterations))
+        factor = _factor(objective, began.x)
+        if factor is None:  # it had one when it began: on a machine that rounds otherwise
+            return replace(state, memory={})
+        stage = _Stage(objective, factor, began)
+        within = State(state.memory["y"], state.value, inner_norm, state.iterations, state.memory)
+        left = min(began.iterations + STAGE, end) - state.iterations
+        return self._descend(stage, within, left, watch)
+
     def _stage(
         self, objective: Objective, factor: ArrowFactor, state: State, left: int, watch: Watcher
     ) -> State:
         stage = _Stage(objective, factor, state)
         began = self.inner.start(stage.evaluate, np.zeros_like(state.x))
         began = State(began.x, state.value, began.gradient_norm, state.iterations, began.memory)
-        ended = self.inner.advance(stage.evaluate, began, left, lambda s: watch(stage.restored(s)))
+        return self._descend(stage, began, left, watch)
+
+    def _descend(self, stage: _Stage, state: State, left: int, watch: Watcher) -> State:
+        ended = self.inner.advance(stage.evaluate, state, left, lambda s: watch(stage.within(s)))
         return stage.restored(ended)
 
 
@@ -113,6 +131,13 @@ class _Stage:
         self._norms[y.tobytes()] = float(np.linalg.norm(gradient))
         return value, self.factor.whiten(gradient)
 
+    def within(self, state: State) -> State:
+        """The restored state, which remembers where the stage began."""
+        began, restored = self.began, self.restored(state)
+        of_stage = [began.value, began.gradient_norm, began.iterations, state.gradient_norm]
+        own = {"stage": began.x, "of_stage": np.array(of_stage, float), "y": state.x}
+        return replace(restored, memory={**state.memory, **own})
+
     def restored(self, state: State) -> State:
         norm = self._norms.get(state.x.tobytes(), self.began.gradient_norm)
         self._norms = {state.x.tobytes(): norm}
@@ -120,13 +145,14 @@ class _Stage:
         return State(x, state.value, norm, state.iterations, stalled=state.stalled)
 
 
-def _settled(objective: Objective, state: State, watch: Watcher) -> State:
+def _settled(objective: Objective, state: State) -> State:
     """The zero of the gradient beside a state; the state itself after the first stage alone."""
-    if state.iterations <= FIRST or not isinstance(objective, Curved):
+    curved: object = objective
+    if state.iterations <= FIRST or not isinstance(curved, Curved):
         return state
     _, gradient = objective(state.x)
     for _ in range(LAST):
-        hessian = objective.curvature(state.x)
+        hessian = curved.curvature(state.x)
         if hessian is None:
             break
         step = hessian.solve(gradient, SHIFTS[0])
@@ -139,14 +165,14 @@ def _settled(objective: Objective, state: State, watch: Watcher) -> State:
         else:
             break
         gradient, state = there, State(x, value, norm, state.iterations + 1)
-        watch(state)
         if np.abs(step).max() < SETTLED:
             break
     return state
 
 
 def _factor(objective: Objective, x: FloatArray) -> ArrowFactor | None:
-    hessian = objective.curvature(x) if isinstance(objective, Curved) else None
+    curved: object = objective
+    hessian = curved.curvature(x) if isinstance(curved, Curved) else None
     if hessian is None:
         return None
     factors = (hessian.factor(shift) for shift in SHIFTS)

@@ -68,10 +68,11 @@ class FlatObjective:
     def curvature(self, x: FloatArray) -> Arrow | None:
         """The Hessian at x; None of a module that does not know it, or where it is not there."""
         self.vector = x
-        if not hasattr(self.module, "curvature"):
+        curvature = getattr(self.module, "curvature", None)
+        if curvature is None:
             return None
         try:
-            return cast("Arrow | None", self.module.curvature())
+            return cast("Arrow | None", curvature())
         except NumericalError:
             return None
 
