@@ -15,7 +15,9 @@ OTHERS = {
         "-0.5 * (t * t + LOG_2PI)",
         "-0.5 * (a * a + LOG_2PI) - log_ndtr(a)",
     },
-    "models/gp/hyperparameters.py": {"v"},  # from log parameters
+    # From log parameters
+    "models/gp/curvature.py": {"log_kernel[2]"},
+    "models/gp/hyperparameters.py": {"v"},
     "models/gp/lapack.py": {"log_kernel[2]"},
     "models/gp/likelihood.py": {"log_kernel[2]"},
     "models/gp/sparse.py": {"log_kernel[2]"},

@@ -65,19 +65,21 @@ def train(
             "Train without --resume.",
         )
 
-    due = began + checkpoint_seconds
+    # A run that goes on from where it was over would not end there: kept is the state before that.
+    due, kept = began + checkpoint_seconds, progress
 
     def converged() -> bool:
         value = max(abs(progress.state.value), 1.0)
         return progress.converged(tolerance * max(magnitude / value, 1.0))
 
     def watch(state: State) -> bool:
-        nonlocal progress, due
+        nonlocal progress, kept, due
         progress = Progress(state, (*progress.curve, state.value))
+        over = converged()
+        kept = kept if over else progress
         monitor.iteration(state)
-        over = converged()  # what is over is not checkpointed within: resumed, it would go on
         if not over and time.perf_counter() >= due:
-            monitor.checkpoint(progress)
+            monitor.checkpoint(kept)
             due = time.perf_counter() + checkpoint_seconds
         return over
 
@@ -94,10 +96,11 @@ def train(
             if state.stalled:
                 status = "stalled"
                 break
-            monitor.checkpoint(progress)
+            kept = progress
+            monitor.checkpoint(kept)
     except KeyboardInterrupt:
         status = "interrupted"
-        monitor.checkpoint(progress)
+        monitor.checkpoint(kept)
     objective.vector = progress.state.x
     if not progress.state.value < float("inf"):
         raise NumericalError("training ended without a finite objective")

@@ -161,7 +161,7 @@ class SharedGPLVM(nn.Module):
         return [value, *gradient]
 
     def gradient_norm(self) -> float:
-        """Length of the objective's gradient."""
+        """Length of the gradient of the objective, Eq. (4)."""
         _, *gradient = self.value_and_gradient()
         return math.hypot(*(float(part.norm()) for part in gradient))
 

@@ -62,46 +62,48 @@ class Conditioned:
         """Run at most so many further iterations; `watch` sees each and may end the run."""
         end, watched = state.iterations + iterations, _Watched(watch)
         while state.iterations < end and not watched.over:
-            if "stage" in state.memory:
-                state = self._resume(objective, state, end, watched)
-                continue
-            left, first = end - state.iterations, FIRST - state.iterations
-            if first > 0 and not state.stalled:
-                state = self.inner.advance(objective, state, min(first, left), watched)
-                continue
-            factor = _factor(objective, state.x)
-            if factor is None:
-                return state if state.stalled else self._plain(objective, state, left, watched)
-            before = state.value
-            state = self._stage(objective, factor, state, min(STAGE, left), watched)
-            if state.stalled and not state.value < before:
-                break
+            before = state
+            state = self._next(objective, state, end, watched)
+            if state.stalled and before.stalled and not state.value < before.value:
+                return state  # neither of two stages has found a descent
         return _settled(objective, state) if watched.over else state
 
+    def _next(self, objective: Objective, state: State, end: int, watch: Watcher) -> State:
+        """The state after the rest of a stage, or after the next one."""
+        if "stage" in state.memory:
+            return self._resume(objective, state, watch)
+        left = end - state.iterations
+        if state.iterations < FIRST and not state.stalled:
+            return self._plain(objective, state, min(FIRST - state.iterations, left), watch)
+        factor = _factor(objective, state.x)
+        if factor is not None:
+            return self._begin(_Stage(objective, factor, state, min(STAGE, left)), watch)
+        return state if state.stalled else self._plain(objective, state, left, watch)
+
     def _plain(self, objective: Objective, state: State, left: int, watch: Watcher) -> State:
+        """Descend in the variables of the run."""
         if not state.memory:  # a conditioned stage leaves none
-            began = self.inner.start(objective, state.x)
-            state = State(state.x, state.value, state.gradient_norm, state.iterations, began.memory)
+            state = replace(state, memory=self.inner.start(objective, state.x).memory)
         return self.inner.advance(objective, state, left, watch)
 
-    def _resume(self, objective: Objective, state: State, end: int, watch: Watcher) -> State:
-        value, norm, iterations, inner_norm = state.memory["of_stage"].tolist()
-        began = State(state.memory["stage"], value, norm, int(iterations))
-        factor = _factor(objective, began.x)
-        if factor is None:  # it had one when it began: on a machine that rounds otherwise
-            return replace(state, memory={})
-        stage = _Stage(objective, factor, began)
-        within = State(state.memory["y"], state.value, inner_norm, state.iterations, state.memory)
-        left = min(began.iterations + STAGE, end) - state.iterations
-        return self._descend(stage, within, left, watch)
+    def _begin(self, stage: _Stage, watch: Watcher) -> State:
+        began = stage.began
+        inner = self.inner.start(stage.evaluate, np.zeros_like(began.x))
+        state = State(inner.x, began.value, inner.gradient_norm, began.iterations, inner.memory)
+        return self._descend(stage, state, stage.length, watch)
 
-    def _stage(
-        self, objective: Objective, factor: ArrowFactor, state: State, left: int, watch: Watcher
-    ) -> State:
-        stage = _Stage(objective, factor, state)
-        began = self.inner.start(stage.evaluate, np.zeros_like(state.x))
-        began = State(began.x, state.value, began.gradient_norm, state.iterations, began.memory)
-        return self._descend(stage, began, left, watch)
+    def _resume(self, objective: Objective, state: State, watch: Watcher) -> State:
+        """Finish the stage within which a state was kept."""
+        value, norm, iterations, length, inner_norm = state.memory["of_stage"].tolist()
+        began = State(state.memory["stage"], value, norm, int(iterations))
+        left = began.iterations + int(length) - state.iterations
+        # Without a factor there it began on a machine that rounds otherwise.
+        factor = _factor(objective, began.x) if left else None
+        if factor is None:
+            return replace(state, memory={})
+        stage = _Stage(objective, factor, began, int(length))
+        within = State(state.memory["y"], state.value, inner_norm, state.iterations, state.memory)
+        return self._descend(stage, within, left, watch)
 
     def _descend(self, stage: _Stage, state: State, left: int, watch: Watcher) -> State:
         ended = self.inner.advance(stage.evaluate, state, left, lambda s: watch(stage.within(s)))
@@ -122,8 +124,11 @@ class _Watched:
 class _Stage:
     """The objective in the variables of a stage, and its states in those of the run."""
 
-    def __init__(self, objective: Objective, factor: ArrowFactor, began: State) -> None:
+    def __init__(
+        self, objective: Objective, factor: ArrowFactor, began: State, length: int
+    ) -> None:
         self.objective, self.factor, self.began = objective, factor, began
+        self.length = length  # in iterations
         self._norms: dict[bytes, float] = {}  # of the gradients since the last iteration
 
     def evaluate(self, y: FloatArray) -> tuple[float, FloatArray]:
@@ -134,8 +139,9 @@ class _Stage:
     def within(self, state: State) -> State:
         """The restored state, which remembers where the stage began."""
         began, restored = self.began, self.restored(state)
-        of_stage = [began.value, began.gradient_norm, began.iterations, state.gradient_norm]
-        own = {"stage": began.x, "of_stage": np.array(of_stage, float), "y": state.x}
+        scalars = [began.value, began.gradient_norm, began.iterations, self.length]
+        of_stage = np.array([*scalars, state.gradient_norm])
+        own = {"stage": began.x, "of_stage": of_stage, "y": state.x}
         return replace(restored, memory={**state.memory, **own})
 
     def restored(self, state: State) -> State:
@@ -147,32 +153,44 @@ class _Stage:
 
 def _settled(objective: Objective, state: State) -> State:
     """The zero of the gradient beside a state; the state itself after the first stage alone."""
-    curved: object = objective
-    if state.iterations <= FIRST or not isinstance(curved, Curved):
+    if state.iterations <= FIRST:
         return state
     _, gradient = objective(state.x)
     for _ in range(LAST):
-        hessian = curved.curvature(state.x)
+        hessian = _curvature(objective, state.x)
         if hessian is None:
             break
         step = hessian.solve(gradient, SHIFTS[0])
-        for share in SHORTER:
-            x = state.x - share * step
-            value, there = objective(x)
-            norm = float(np.linalg.norm(there))
-            if np.isfinite(value) and norm < state.gradient_norm:
-                break
-        else:
+        found = _nearer(objective, state, step)
+        if found is None:
             break
-        gradient, state = there, State(x, value, norm, state.iterations + 1)
+        state, gradient = found
         if np.abs(step).max() < SETTLED:
             break
     return state
 
 
-def _factor(objective: Objective, x: FloatArray) -> ArrowFactor | None:
+def _nearer(
+    objective: Objective, state: State, step: FloatArray
+) -> tuple[State, FloatArray] | None:
+    """The state after so much of a step that the gradient is smaller, and the gradient there."""
+    for share in SHORTER:
+        x = state.x - share * step
+        value, gradient = objective(x)
+        norm = float(np.linalg.norm(gradient))
+        if np.isfinite(value) and norm < state.gradient_norm:
+            return State(x, value, norm, state.iterations + 1), gradient
+    return None
+
+
+def _curvature(objective: Objective, x: FloatArray) -> Arrow | None:
     curved: object = objective
-    hessian = curved.curvature(x) if isinstance(curved, Curved) else None
+    return curved.curvature(x) if isinstance(curved, Curved) else None
+
+
+def _factor(objective: Objective, x: FloatArray) -> ArrowFactor | None:
+    """The factor of the Hessian with the least shift by which it has one."""
+    hessian = _curvature(objective, x)
     if hessian is None:
         return None
     factors = (hessian.factor(shift) for shift in SHIFTS)
