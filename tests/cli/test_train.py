@@ -158,7 +158,7 @@ def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow,
     finished = api.load(model).figures
     assert finished["iterations"] > stopped["iterations"]
     assert finished["objective"] < stopped["objective"]
-    assert finished["status"] == "iteration limit"
+    assert finished["status"] in ("iteration limit", "stalled")  # or at the minimum before
 
     assert facert(*arguments[:-1], quick, "--resume").code == 0
     assert api.load(model).figures["status"] == "converged"

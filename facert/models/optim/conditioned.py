@@ -66,7 +66,11 @@ class Conditioned:
             state = self._next(objective, state, end, watched)
             if state.stalled and before.stalled and not state.value < before.value:
                 return state  # neither of two stages has found a descent
-        return _settled(objective, state) if watched.over else state
+        if watched.over:
+            ended, state = state, _settled(objective, state)
+            if state is not ended:
+                watch(state)
+        return state
 
     def _next(self, objective: Objective, state: State, end: int, watch: Watcher) -> State:
         """The state after the rest of a stage, or after the next one."""
