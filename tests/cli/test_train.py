@@ -119,7 +119,7 @@ def slow(tmp_path):
     """Settings that leave time to stop a run."""
     path = tmp_path / "slow.toml"
     path.write_text(
-        'method = "ssgplvm"\ncheckpoint_every = 15\ntolerance = 0.0\nmax_iterations = 300\n'
+        'method = "ssgplvm"\ncheckpoint_every = 15\ntolerance = 0.0\nmax_iterations = 100\n'
     )
     return path
 
@@ -158,7 +158,7 @@ def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow,
     finished = api.load(model).figures
     assert finished["iterations"] > stopped["iterations"]
     assert finished["objective"] < stopped["objective"]
-    assert finished["status"] in ("iteration limit", "stalled")  # or at the minimum before
+    assert finished["status"] == "iteration limit"
 
     assert facert(*arguments[:-1], quick, "--resume").code == 0
     assert api.load(model).figures["status"] == "converged"
