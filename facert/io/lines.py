@@ -6,8 +6,9 @@ import csv
 import logging
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,11 +30,10 @@ _QUOTED = re.compile(r'"(?:[^"]|"")*"')
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _PLAIN = re.compile(r"[+-]?\d*\.\d+")
-_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
+_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """The cells of one line, and its number (from 1)."""
 
     number: int
@@ -123,7 +123,7 @@ def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Lin
     separator = separator or separator_of(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
-        rows = [Line(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+        rows = [Line(reader.line_num, cells) for cells in reader if "".join(cells).strip()]
     except csv.Error as error:
         line = f"line {reader.line_num}"
         raise InputError(line, "separated cells", str(error), "Export it again.") from error
@@ -145,7 +145,11 @@ def with_points(rows: list[Line]) -> list[Line]:
     cells = [cell.strip() for row in rows for cell in row.cells]
     if any(map(_POINT.fullmatch, cells)):
         return rows
-    return [Line(row.number, [_COMMA.sub(r"\1.\2", cell) for cell in row.cells]) for row in rows]
+    return [Line(row.number, list(map(_with_point, row.cells))) for row in rows]
+
+
+def _with_point(cell: str) -> str:
+    return cell.replace(",", ".") if "," in cell and _COMMA.fullmatch(cell) else cell
 
 
 def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
@@ -153,9 +157,10 @@ def check_width(rows: Sequence[Line], header: Sequence[str]) -> None:
 
     Raises `InputError` naming the first line that has not.
     """
-    for row in rows:
-        if len(row.cells) != len(header):
-            raise row.error("", f"{len(header)} cells as in the header", f"{len(row.cells)}")
+    if {len(row.cells) for row in rows} <= {len(header)}:
+        return
+    row = next(row for row in rows if len(row.cells) != len(header))
+    raise row.error("", f"{len(header)} cells as in the header", f"{len(row.cells)}")
 
 
 def without_cut_end(rows: Sequence[Line]) -> list[Line]:
@@ -192,9 +197,14 @@ def to_numbers(rows: Sequence[Line], header: Sequence[str], columns: Sequence[in
 
     Raises `InputError` naming the line and the column of the first cell that is no number.
     """
-    cells = [[row.cells[column].strip() or "nan" for column in columns] for row in rows]
+    chosen: list[Sequence[str]] = [row.cells for row in rows]
+    if list(columns) != list(range(len(header))):
+        chosen = [[cells[column] for column in columns] for cells in chosen]
+    with suppress(ValueError):  # a blank cell, or no number
+        return np.array(chosen, dtype=np.float64).reshape(len(rows), len(columns))
     try:
-        return np.array(cells, dtype=np.float64).reshape(len(rows), len(columns))
+        observed = [[cell.strip() or "nan" for cell in cells] for cells in chosen]
+        return np.array(observed, dtype=np.float64).reshape(len(rows), len(columns))
     except ValueError:
         raise _first_bad_cell(rows, header, columns) from None
 

@@ -40,6 +40,9 @@ NO_TARGET = ""
 
 _SOURCES = {"markers": "marker_names", "positions": "names", "weights": "weight_names"}
 _PLAIN = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_MOST_NAMED = 2**20
+_TAIL, _END, _LOCATOR, _LARGE_END = 2**16 + 128, 22, 20, 56
+"""Bytes of an archive in which it ends, and of the records there (PKWARE's APPNOTE, 4.3.14-16)."""
 
 
 class Archive:
@@ -110,11 +113,31 @@ def open_archive(path: Path) -> Iterator[Archive]:
     Raises `InputError` when the file is missing or is no .npz archive.
     """
     with reading(path):
-        existing_file(path)
+        _require_few_members(path)
         with parsing("file", "an .npz archive", "Store it anew.", "something else"):
             file = zipfile.ZipFile(path)
         with file:
             yield Archive(file, FileMemory(path))
+
+
+def _require_few_members(path: Path) -> None:
+    """Check the table of an archive's members before each of them takes its object.
+
+    Raises `InputError` where it is larger than that of any take.
+    """
+    with existing_file(path).open("rb") as file:
+        file.seek(max(path.stat().st_size - _TAIL, 0))
+        tail = file.read()
+    place = tail.rfind(b"PK\5\6")
+    if place < 0 or len(tail) < place + _END:
+        return  # no archive, as is said soon
+    size = int.from_bytes(tail[place + 12 : place + 16], "little")
+    if tail[place - _LOCATOR : place].startswith(b"PK\6\7"):  # of an archive of many gibibytes
+        record = tail[place - _LOCATOR - _LARGE_END : place - _LOCATOR]
+        size = int.from_bytes(record[40:48], "little")
+    if size > _MOST_NAMED:
+        expected, fix = f"at most {_MOST_NAMED} bytes that name arrays", "Store the take alone."
+        raise InputError("file", expected, f"{size}", fix)
 
 
 def kind_of(path: Path, _asked: str | None = None) -> Literal["take", "rig"]:

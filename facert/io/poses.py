@@ -18,8 +18,9 @@ from facert.data.resampling import counted_at
 from facert.data.rig import Rig
 from facert.data.take import Take
 from facert.data.text import for_shell, plural
-from facert.errors import InputError, reading
+from facert.errors import InputError
 from facert.io.formats import read_any, require_take
+from facert.io.guarded import door
 from facert.io.lines import read_csv, read_header
 from facert.io.tables.clock_column import clock_of
 from facert.io.tables.csv_table import is_marked
@@ -50,7 +51,7 @@ def read_poses(
     it, or a model predicted them all.
     """
     path = Path(path)
-    with reading(path):
+    with door(path):
         table = _numbered_table(path)
         if table is not None:
             poses = _of_numbers(table, keep, fps)
@@ -65,7 +66,8 @@ def read_poses(
 
 def numbers_frames(path: Path) -> bool:
     """Whether a file is a table with a column of frame numbers."""
-    return _numbered_table(path) is not None
+    with door(path):
+        return _numbered_table(path) is not None
 
 
 def _has_column_of_times(path: Path) -> bool:

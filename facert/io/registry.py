@@ -15,10 +15,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from facert.errors import InputError, OutputExistsError, OutputKeptError, reading
+from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.io.claims import claim
 from facert.io.content import endings_by_content
-from facert.io.guarded import parsing
+from facert.io.guarded import door, parsing
 
 Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
 Use = Literal["read", "write"]
@@ -340,7 +340,7 @@ def read(name: str, path: Path, *arguments: object, **options: object) -> Any:
 
     Raises `InputError` that names the file for whatever goes wrong in it, and is not of the system.
     """
-    with reading(path), parsing("file", "content that makes sense"):
+    with door(path):
         return function(name)(path, *arguments, **options)
 
 

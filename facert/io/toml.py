@@ -19,8 +19,8 @@ from typing import Any
 
 from facert.data.drivers import Drivers
 from facert.data.regions import Regions
-from facert.errors import InputError, reading
-from facert.io.guarded import read_text
+from facert.errors import InputError
+from facert.io.guarded import door, read_text
 
 REGIONS_EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
 DRIVERS_EXAMPLE = '[[eyeLookInLeft]] with node = "eye_L" and rotate = [0, 25, 0] below'
@@ -39,7 +39,7 @@ def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
 
     Raises `InputError` with this example when the file is missing, too large, or not TOML.
     """
-    with reading(path):
+    with door(path):
         try:
             text = read_text(path)
             if _LONG_KEY.search(text):
@@ -55,7 +55,7 @@ def read_regions(path: Path) -> Regions:
 
     Raises `InputError` when the file is missing, too large, not TOML, or holds anything else.
     """
-    with reading(path):
+    with door(path):
         return Regions.of(read_toml(path, REGIONS_EXAMPLE))
 
 
@@ -64,7 +64,7 @@ def read_drivers(path: Path) -> Drivers:
 
     Raises `InputError` when the file is missing, too large, not TOML, or holds anything else.
     """
-    with reading(path):
+    with door(path):
         return Drivers.of(read_toml(path, DRIVERS_EXAMPLE))
 
 

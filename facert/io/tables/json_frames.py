@@ -15,6 +15,7 @@ from typing import Any
 
 from facert.data.column_names import Role, role_of_name
 from facert.errors import InputError
+from facert.io.tables.table import require_few
 
 log = logging.getLogger("facert")
 
@@ -29,6 +30,8 @@ _OF_POINTS = frozenset((*_AXES, "w", "h", "width", "height", "visibility", "pres
                         "confidence", "id", "index", *_NAME_KEYS))  # fmt: skip
 _DEEPEST = 6
 _CLOCKS = (Role.CLOCK, Role.FRAME)
+MOST_FRAMES = 2**20
+"""More than in nine hours; each is an object of its own, even where there is nothing in it."""
 
 
 @dataclass
@@ -53,7 +56,10 @@ def parsed(text: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        lines = [line for line in text.splitlines() if line.strip()]
+        many = text.count("\n") > MOST_FRAMES
+        lines = [] if many else [line for line in text.splitlines() if line.strip()]
+        if many and text.partition("\n")[0].rstrip().endswith(("}", "]")):
+            raise _too_many(text.count("\n")) from None
         if len(lines) < 2 or not all(line.lstrip()[0] in "{[" for line in lines):
             raise InputError("file", "JSON", str(error), "Export it again.") from None
     try:
@@ -61,6 +67,11 @@ def parsed(text: str) -> Any:
     except (ValueError, RecursionError) as error:
         expected = "JSON, whole or in each line"
         raise InputError("lines", expected, str(error), "Export it again.") from None
+
+
+def _too_many(frames: int) -> InputError:
+    expected = f"at most {MOST_FRAMES} frames"
+    return InputError("frames", expected, f"{frames}", "Cut it into parts.")
 
 
 def _documents(lines: Sequence[str]) -> list[Any]:
@@ -88,6 +99,8 @@ def frames_of(document: Any) -> list[Frame]:
         expected = "frames of weights by name, or facsNames and weightMat"
         raise InputError("weightMat", expected, keys or "nothing", "Export it in such a layout.")
     frames = max(lists, key=len)
+    if len(frames) > MOST_FRAMES:
+        raise _too_many(len(frames))
     return [_frame(one, names) for one in frames[_is_header(frames) :]]
 
 
@@ -190,7 +203,7 @@ def _is_row(value: Any, names: Sequence[str]) -> bool:
     """Whether a value has a number, or null, for each name."""
     if not isinstance(value, list) or not names or len(value) != len(names):
         return False
-    return all(one is None or _is_number(one) for one in value)
+    return _are_numbers(value)
 
 
 def _of_columns(document: Mapping[str, Any]) -> list[Any] | None:
@@ -207,7 +220,7 @@ def _of_columns(document: Mapping[str, Any]) -> list[Any] | None:
 
 def _is_column(value: Any) -> bool:
     plain = isinstance(value, list) and len(value) > 1
-    return plain and all(one is None or _is_number(one) for one in value)
+    return plain and _are_numbers(value)
 
 
 def _is_objects(value: Any) -> bool:
@@ -246,6 +259,7 @@ def _add(frame: Frame, key: str, value: Any, names: Sequence[str], depth: int) -
 def _add_object(
     frame: Frame, key: str, value: Mapping[str, Any], names: Sequence[str], depth: int
 ) -> None:
+    require_few(len(value))
     group: dict[str, Number] = {}
     for name, inner in value.items():
         named = _numbers_of(name, inner) if depth else None
@@ -279,7 +293,7 @@ def _add_list(
         frame.groups.setdefault(key, {}).update(pairs)
     elif value and _is_point(value[0]):  # in a plane, or a box
         frame.others.add(key)
-    elif all(one is None or _is_number(one) for one in value):
+    elif _are_numbers(value):
         _add_numbers(frame, key, value, names)
     elif isinstance(value[0], dict | list):  # of several faces the first
         _add(frame, key, value[0], names, depth + 1)
@@ -348,6 +362,11 @@ def _pair(value: Any) -> tuple[str | None, Number | None]:
 
 def _score(value: Mapping[str, Any]) -> Number | None:
     return next((value[key] for key in _SCORE_KEYS if _is_number(value.get(key))), None)
+
+
+def _are_numbers(values: Sequence[Any]) -> bool:
+    """Whether each is a number, or null."""
+    return set(map(type, values)) <= {int, float, bool, type(None)}
 
 
 def _is_number(value: Any) -> bool:
