@@ -16,6 +16,20 @@ from facert.errors import InputError
 
 # Less motion than this, relative to the largest coordinate, is rounding.
 STILL = 1e-9
+SIZES = (1e-100, 1e100)
+"""The largest number of an array lies between these: else its square is no number, or nothing."""
+
+
+def require_size(values: FloatArray, field: str) -> None:
+    """Refuse an array in a unit so large or small that nothing can be computed; NaN is passed over.
+
+    Zeros alone have a size: there is nothing wrong with their unit.
+    """
+    largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))
+    if largest > 0.0 and not SIZES[0] <= largest <= SIZES[1]:
+        raise InputError(
+            field, "numbers of a sensible size", f"up to {largest:.1e}", "Check the units."
+        )
 
 
 @dataclass(frozen=True)
@@ -31,14 +45,12 @@ class Normalisation:
     def of(cls, values: FloatArray, field: str) -> Normalisation:
         """The normalisation of rows (n, d); NaN is passed over.
 
-        Raises `InputError` when nothing varies.
+        Raises `InputError` when nothing varies, or as `require_size` does.
         """
+        require_size(values, field)
         mean = np.nanmean(values, axis=0)
         scale = float(np.nanstd(values, axis=0).max())
-        if not np.isfinite(scale):
-            found = f"up to {np.nanmax(np.abs(values)):.1e}"
-            raise InputError(field, "numbers of a sensible size", found, "Check the units.")
-        if not scale > STILL * max(float(np.nanmax(np.abs(values))), 1e-300):
+        if not scale > STILL * float(np.nanmax(np.abs(values))):
             expected, found = "values that change over the rows", "the same row throughout"
             raise InputError(field, expected, found, "Check that the right data was exported.")
         return cls(mean, scale)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from sklearn.cross_decomposition import PLSRegression
 
 from facert.data.arrays import FloatArray
 from facert.methods.folds import blocked_folds
 from facert.methods.regression import Map, SupervisedRegression
 from facert.models.loo import LinearRidge
+from facert.models.partial_least_squares import LeastSquaresComponents
 
 # Penalties relative to the mean sum of squares of a frame.
 PENALTIES = np.logspace(-7, 2, 46)
@@ -59,31 +58,11 @@ class PLS(SupervisedRegression):
         folds = blocked_folds(len(X))
         # The smallest fold decides; centring takes one more.
         most = min(MAX_COMPONENTS, X.shape[1], *(len(train) - 1 for train, _ in folds))
-        errors = sum(
-            np.sum((_poses_by_components(X[train], Y[train], X[test], most) - Y[test]) ** 2, (1, 2))
-            for train, test in folds
-        )
+        errors = np.zeros(most)
+        for train, test in folds:
+            poses = LeastSquaresComponents.of(X[train], Y[train], most).outputs(X[test], most)
+            errors += np.sum((poses - Y[test]) ** 2, axis=(1, 2))
         components = int(np.argmin(errors)) + 1
-        found = _components(X, Y, components)
-        weights = found.coef_.T.copy()
-        offset = found.intercept_ - X.mean(axis=0) @ weights
-        return LinearMap(weights, offset), {"components": components}
-
-
-def _poses_by_components(X: FloatArray, Y: FloatArray, frames: FloatArray, most: int) -> FloatArray:
-    """Poses of frames (T, d_x) by 1 to `most` components, (most, T, d_y).
-
-    Components are found one after the other: each model is the next with its last term left off.
-    """
-    model = _components(X, Y, most)
-    scores = (frames - X.mean(axis=0)) @ model.x_rotations_
-    terms = scores.T[:, :, None] * model.y_loadings_.T[:, None, :]
-    poses: FloatArray = Y.mean(axis=0) + np.cumsum(terms, axis=0)
-    return poses
-
-
-def _components(X: FloatArray, Y: FloatArray, count: int) -> PLSRegression:
-    with warnings.catch_warnings():
-        # Where fewer components explain everything the others are zero, which does no harm.
-        warnings.filterwarnings("ignore", "y residual is constant", UserWarning)
-        return PLSRegression(count, scale=False).fit(X, Y)
+        found = LeastSquaresComponents.of(X, Y, components)
+        offset = found.mean_Y - found.mean_X @ found.weights
+        return LinearMap(found.weights, offset), {"components": components}

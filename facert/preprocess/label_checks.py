@@ -16,6 +16,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
 from facert.data.limits import SEVERAL, beyond, known_poses_of
+from facert.data.normalisation import SIZES, require_size
 from facert.data.spelling import words
 from facert.data.take import Take
 from facert.data.text import listed, plural
@@ -83,10 +84,15 @@ def warn_of_labels(take: Take, name_of: Callable[[int], str] = str) -> None:
     """Log what is odd about the poses of a take: scales, slips, plateaus, controls at rest.
 
     `name_of` is what people are shown of a frame's number, where the take is several.
+
+    Raises `InputError` for poses in a unit that nothing can be computed in.
     """
     if take.params is None or take.controls is None or not len(take.labels):
         return
     controls, values = take.controls, take.params[take.labels]
+    require_size(values, "/target/params")
+    if take.animation is not None:
+        require_size(take.animation, "/animation/params")
     frames = [name_of(frame) for frame in take.labels.tolist()]
     labels = _Labels(controls.names, frames, values, controls.limits, take.animation)
     rows = _rows_in_percent(labels)
@@ -287,10 +293,11 @@ def _name_unmoved(take: Take) -> None:
 
 
 def _widest(limits: FloatArray | None) -> FloatArray:
-    """How far finite limits let a control go, (P,); 0 without."""
+    """How far limits let a control go, (P,); 0 without, or where they are as good as infinite."""
     if limits is None:
         return np.zeros(1)
-    return np.asarray(np.where(np.isfinite(limits), np.abs(limits), 0.0).max(axis=1))
+    sizes = np.abs(limits)
+    return np.asarray(np.where(sizes < SIZES[1], sizes, 0.0).max(axis=1))
 
 
 def _own(sizes: FloatArray) -> FloatArray:
@@ -319,4 +326,4 @@ def _reach(sizes: FloatArray, limits: FloatArray | None) -> FloatArray:
     if limits is None:
         return np.asarray(reach)
     widest = np.abs(limits).max(axis=1)
-    return np.asarray(np.where(np.isfinite(widest) & (widest > 0.0), widest, reach))
+    return np.asarray(np.where((widest < SIZES[1]) & (widest > 0.0), widest, reach))

@@ -11,9 +11,9 @@ from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import blocked_folds
 from facert.methods.interpolation import SMOOTHING
-from facert.methods.linear import _poses_by_components
 from facert.methods.registry import make_method
 from facert.methods.svr import PackedMap
+from facert.models.partial_least_squares import LeastSquaresComponents
 from facert.settings import Settings
 
 
@@ -72,9 +72,9 @@ def test_each_control_has_its_own_penalty():
 
 def test_all_numbers_of_components_come_from_one_fit():
     X, Y = linear_data(noise=0.1)
-    poses = _poses_by_components(X[:20], Y[:20], X[20:], 5)
+    poses = LeastSquaresComponents.of(X[:20], Y[:20], 5).outputs(X[20:], 5)
     for count in range(1, 6):
-        expected = PLSRegression(count, scale=False).fit(X[:20], Y[:20]).predict(X[20:])
+        expected = PLSRegression(count, scale=False, tol=1e-15).fit(X[:20], Y[:20]).predict(X[20:])
         np.testing.assert_allclose(poses[count - 1], expected, atol=1e-8)
 
 

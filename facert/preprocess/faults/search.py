@@ -50,8 +50,13 @@ def find_faults(source: Source, posed: IntArray | None = None) -> Faults:
     """
     usual = float(np.nanmedian(np.abs(source.values)))
     require_bounded(np.array([usual]), f"/source/{source.kind}")
-    values = np.clip(source.values, -LARGEST, LARGEST)
+    values = _computable(source)
     return _of_markers(values) if source.kind == "markers" else _of_weights(values, posed)
+
+
+def _computable(source: Source) -> FloatArray:
+    """The values of a source, those whose squares are no numbers replaced by `LARGEST`."""
+    return np.clip(source.values, -LARGEST, LARGEST)
 
 
 def without_faults(take: Take) -> Take:
@@ -72,7 +77,7 @@ def without_faults(take: Take) -> Take:
 def _warn_of_held(source: Source) -> None:
     """Warn of frames of weights that repeat, and end with a jump."""
     if source.kind == "weights":
-        for first, last in held_frames(source.values):
+        for first, last in held_frames(_computable(source)):
             text = "all weights stay the same in frames %d to %d, and then jump: where the face was"
             log.warning("%s lost, blank these rows", text % (first, last))
 
