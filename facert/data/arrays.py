@@ -25,6 +25,9 @@ RATES = (1e-15, 1e15)
 LARGEST = 1e15
 """No coordinate of a mesh is larger, in whatever unit: products of four are numbers still."""
 
+SIZES = (1e-100, 1e100)
+"""The largest number of an array lies between these: else its square is no number, or nothing."""
+
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 # HDF5 cannot hold NUL, UTF-8 no half of a pair; control characters and line ends upset a terminal.

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import SIZES, FloatArray
 from facert.errors import InputError
 
 # Less motion than this, relative to the largest coordinate, is rounding.
 STILL = 1e-9
-SIZES = (1e-100, 1e100)
-"""The largest number of an array lies between these: else its square is no number, or nothing."""
 
 
 def require_size(values: FloatArray, field: str) -> None:
@@ -47,9 +45,11 @@ class Normalisation:
 
         Raises `InputError` when nothing varies, or as `require_size` does.
         """
-        require_size(values, field)
+        moves = bool((np.fmin.reduce(values) < np.fmax.reduce(values)).any())
+        if moves:
+            require_size(values, field)
         mean = np.nanmean(values, axis=0)
-        scale = float(np.nanstd(values, axis=0).max())
+        scale = float(np.nanstd(values, axis=0).max()) if moves else 0.0
         if not scale > STILL * float(np.nanmax(np.abs(values))):
             expected, found = "values that change over the rows", "the same row throughout"
             raise InputError(field, expected, found, "Check that the right data was exported.")

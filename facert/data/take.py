@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from facert.data.arrays import (
+    SIZES,
     BoolArray,
     FloatArray,
     IntArray,
@@ -126,8 +127,12 @@ class Controls:
         limits = float_array(self.limits, "/target/limits")
         path, fix = "/target/limits", "Give the lowest and the highest value of each control."
         require_shape(limits.shape, (len(names), 2), path, fix)
-        if not (limits[:, 0] <= limits[:, 1]).all():
+        low, high = limits.T
+        if not (low <= high).all():
             raise InputError(path, "low <= high", "low > high or NaN", fix)
+        if (low > SIZES[1]).any() or (high < -SIZES[1]).any():
+            expected, found = "limits with a pose between them", "both as good as infinite"
+            raise InputError(path, expected, found, fix)
         set_fields(self, limits=frozen(limits))
 
 

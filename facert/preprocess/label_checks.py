@@ -14,9 +14,9 @@ from shlex import quote
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray
+from facert.data.arrays import SIZES, BoolArray, FloatArray
 from facert.data.limits import SEVERAL, beyond, known_poses_of
-from facert.data.normalisation import SIZES, require_size
+from facert.data.normalisation import require_size
 from facert.data.spelling import words
 from facert.data.take import Take
 from facert.data.text import listed, plural

@@ -79,7 +79,9 @@ def test_a_source_that_cannot_be_is_refused(values, names, message):
 
 
 @pytest.mark.parametrize(
-    "limits", [[[1, 0]], [[0, 1], [0, 1]], [[np.nan, 1]]], ids=["order", "shape", "NaN"]
+    "limits",
+    [[[1, 0]], [[0, 1], [0, 1]], [[np.nan, 1]], [[np.inf, np.inf]], [[-np.inf, -np.inf]]],
+    ids=["order", "shape", "NaN", "beyond all", "below all"],
 )
 def test_limits_are_one_rising_pair_a_control(limits):
     with pytest.raises(InputError, match="/target/limits"):

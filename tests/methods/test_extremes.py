@@ -136,14 +136,18 @@ def _take(X, Y, parts):
     )
 
 
+def require_said(message):
+    assert ": expected " in message
+    assert ", found " in message
+
+
 def check(make, method):
     """Train, save, load and map: sound poses, the same of both, or an error that says it all."""
     try:
         take = make()
         retargeter = facert.train(take, Settings(method=method, **QUICK))
-    except InputError as error:
-        assert ": expected " in str(error)
-        assert ", found " in str(error)
+    except InputError as refused:
+        require_said(str(refused))
         return
     with TemporaryDirectory() as folder:
         retargeter.save(f"{folder}/model.safetensors")
