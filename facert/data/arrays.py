@@ -24,9 +24,8 @@ RATES = (1e-15, 1e15)
 """Frames a second, between which a rate lies."""
 LARGEST = 1e15
 """No coordinate of a mesh is larger, in whatever unit: products of four are numbers still."""
-
-SIZES = (1e-100, 1e100)
-"""The largest number of an array lies between these: else its square is no number, or nothing."""
+SMALLEST = 1e-100
+"""In a unit in which all is smaller, squares are nothing."""
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -103,6 +102,15 @@ def require_bounded(array: FloatArray, path: str) -> None:
     most = max(np.fmax.reduce(array, None, initial=0.0), -np.fmin.reduce(array, None, initial=0.0))
     if most > LARGEST:
         raise InputError(path, "numbers of a sensible size", f"{most:.1e}", "Check the units.")
+
+
+def require_size(array: FloatArray, path: str) -> None:
+    """Refuse numbers in a unit so large or small that nothing can be computed; 0 is in any unit."""
+    require_bounded(array, path)
+    most = max(np.fmax.reduce(array, None, initial=0.0), -np.fmin.reduce(array, None, initial=0.0))
+    if 0.0 < most < SMALLEST:
+        found = f"up to {most:.1e}"
+        raise InputError(path, "numbers of a sensible size", found, "Check the units.")
 
 
 def single_precision(array: FloatArray, path: str) -> NDArray[np.float32]:

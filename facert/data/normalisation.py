@@ -11,23 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import SIZES, FloatArray
+from facert.data.arrays import FloatArray, require_size
 from facert.errors import InputError
 
 # Less motion than this, relative to the largest coordinate, is rounding.
 STILL = 1e-9
-
-
-def require_size(values: FloatArray, field: str) -> None:
-    """Refuse an array in a unit so large or small that nothing can be computed; NaN is passed over.
-
-    Zeros alone have a size: there is nothing wrong with their unit.
-    """
-    largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))
-    if largest > 0.0 and not SIZES[0] <= largest <= SIZES[1]:
-        raise InputError(
-            field, "numbers of a sensible size", f"up to {largest:.1e}", "Check the units."
-        )
 
 
 @dataclass(frozen=True)
@@ -43,7 +31,7 @@ class Normalisation:
     def of(cls, values: FloatArray, field: str) -> Normalisation:
         """The normalisation of rows (n, d); NaN is passed over.
 
-        Raises `InputError` when nothing varies, or as `require_size` does.
+        Raises `InputError` when nothing varies, or as `facert.data.arrays.require_size` does.
         """
         moves = bool((np.fmin.reduce(values) < np.fmax.reduce(values)).any())
         if moves:

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from facert.data.arrays import (
-    SIZES,
+    LARGEST,
     BoolArray,
     FloatArray,
     IntArray,
@@ -130,7 +130,7 @@ class Controls:
         low, high = limits.T
         if not (low <= high).all():
             raise InputError(path, "low <= high", "low > high or NaN", fix)
-        if (low > SIZES[1]).any() or (high < -SIZES[1]).any():
+        if (low > LARGEST).any() or (high < -LARGEST).any():
             expected, found = "limits with a pose between them", "both as good as infinite"
             raise InputError(path, expected, found, fix)
         set_fields(self, limits=frozen(limits))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import SIZES, FloatArray, IntArray
+from facert.data.arrays import LARGEST, FloatArray, IntArray
 from facert.data.limits import bounds_of
 from facert.data.take import Take
 from facert.settings import LimitRule
@@ -58,7 +58,7 @@ def pose_bounds(take: Take, posed: FloatArray, rule: LimitRule) -> FloatArray | 
     """
     declared = None if take.controls is None else take.controls.limits
     if declared is not None:  # in other units, what is as good as infinite would overflow
-        declared = np.where(np.abs(declared) > SIZES[1], np.copysign(np.inf, declared), declared)
+        declared = np.where(np.abs(declared) > LARGEST, np.copysign(np.inf, declared), declared)
     if rule == "none":
         return None
     if rule == "declared":

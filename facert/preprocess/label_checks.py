@@ -14,9 +14,8 @@ from shlex import quote
 
 import numpy as np
 
-from facert.data.arrays import SIZES, BoolArray, FloatArray
+from facert.data.arrays import LARGEST, BoolArray, FloatArray, require_size
 from facert.data.limits import SEVERAL, beyond, known_poses_of
-from facert.data.normalisation import require_size
 from facert.data.spelling import words
 from facert.data.take import Take
 from facert.data.text import listed, plural
@@ -297,7 +296,7 @@ def _widest(limits: FloatArray | None) -> FloatArray:
     if limits is None:
         return np.zeros(1)
     sizes = np.abs(limits)
-    return np.asarray(np.where(sizes < SIZES[1], sizes, 0.0).max(axis=1))
+    return np.asarray(np.where(sizes < LARGEST, sizes, 0.0).max(axis=1))
 
 
 def _own(sizes: FloatArray) -> FloatArray:
@@ -326,4 +325,4 @@ def _reach(sizes: FloatArray, limits: FloatArray | None) -> FloatArray:
     if limits is None:
         return np.asarray(reach)
     widest = np.abs(limits).max(axis=1)
-    return np.asarray(np.where((widest < SIZES[1]) & (widest > 0.0), widest, reach))
+    return np.asarray(np.where((widest < LARGEST) & (widest > 0.0), widest, reach))
