@@ -288,3 +288,42 @@ def test_from_nothing_to_a_model(visit, rig, recording, tmp_path) -> None:
         assert page.worker.finish()
         assert np.abs(page.editor.pose - recording.params[15]).mean() < 0.2
         assert seen.errors == []
+
+
+EVIL = (
+    "<img src=x onerror=evil()>",
+    "[x](javascript:evil())",
+    "**b** <script>evil()</script>",
+    "![x](x onerror=evil())",
+)
+
+
+@pytest.mark.parametrize("kind", ["view", "pose"])
+def test_a_hostile_name_is_text_on_the_page(kind, visit, rig, recording, tmp_path) -> None:
+    hostile = replace(rig, names=(*EVIL, *rig.names[len(EVIL) :]))
+    controls = facert.Controls((*EVIL, *recording.controls.names[len(EVIL) :]))
+    names = (*EVIL, *recording.source.names[len(EVIL) :])
+    source = facert.Source(recording.source.values, names)
+    take = replace(recording, source=source, controls=controls, start_timecode=EVIL[0])
+    with page_server(EVIL[0], port=0) as server:
+        if kind == "view":
+            page = ViewPage(server, Performance(take, np.array([0]), hostile, take))
+            stop = page.worker.stop
+        else:
+            page = PosePage(server, hostile, PosingSession(controls, take, None, tmp_path / "t.h5"))
+            stop = page.stop
+        with visit(address(server)) as seen:
+            _require_text(seen, kind)
+        stop()
+
+
+def _require_text(seen, kind: str) -> None:
+    """What names say stands on the page to be read, and nothing that they ask for was made."""
+    shown = seen.page.locator("body")
+    assert seen.until(lambda: "onerror=evil()" in shown.inner_text())
+    if kind == "pose":
+        assert all(name in shown.inner_text() for name in EVIL)
+    made = "img[src='x'], img[onerror], a[href^='javascript'], body script:not([src]), strong"
+    contents = seen.page.locator(made).evaluate_all("all => all.map(one => one.outerHTML)")
+    assert not [one for one in contents if "evil" in one or one.startswith("<strong")]
+    assert not [line for line in seen.errors if "evil" in line]
