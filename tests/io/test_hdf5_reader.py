@@ -1,12 +1,14 @@
 """Whatever structures the HDF5 library writes, facert's reader gives the library's own numbers."""
 
+import io
+
 import h5py
 import numpy as np
 import pytest
 
 from facert.errors import InputError
 from facert.io.hdf5 import open_guarded
-from facert.io.hdf5_reader.stored_bytes import checksum
+from facert.io.hdf5_reader.stored_bytes import DamagedError, StoredBytes, checksum
 
 VERSIONS = ["earliest", "v110", "latest"]
 GZIP = {"compression": "gzip", "shuffle": True}
@@ -155,6 +157,16 @@ def test_flags_and_empty_text_as_pytables_has_them(path):
 
 def test_the_checksum_is_that_of_its_author():
     assert checksum(b"Four score and seven years ago") == 0x17770551
+
+
+def test_checksums_of_a_file_of_holes_take_no_minutes():
+    hole = b"FADB" + bytes(2**22)
+    file = StoredBytes(io.BytesIO(hole), len(hole))
+    with pytest.raises(DamagedError, match="a wrong checksum"):
+        file.checked(0, 100, b"FADB")
+    assert file.checked(0, len(hole), b"FADB").left == 2**22 - 4
+    with pytest.raises(DamagedError, match="bytes of FADB"):
+        file.checked(0, 2**24 + 1, b"FADB")
 
 
 @pytest.mark.parametrize("filters", [{"compression": "gzip"}, {"compression": "lzf"}, {}])
