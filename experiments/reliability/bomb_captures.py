@@ -150,7 +150,10 @@ def with_toml(content: Any) -> Any:
     return make
 
 
-TOML = ("train DIR/take.csv -m DIR/out.m --regions FILE", "inspect DIR/face.glb --drivers FILE")
+TOML = (
+    "train DIR/take.csv -o DIR/out.safetensors --regions FILE",
+    "convert DIR/face.glb DIR/out.h5 --drivers FILE",
+)
 TOMLS: dict[str, Any] = {
     "lists 10^5 deep": "a = " + "[" * 100_000 + "]" * 100_000,
     "tables 10^5 deep": "a = " + "{a = " * 100_000 + "1" + "}" * 100_000,

@@ -20,11 +20,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.reliability import bomb_archives, bomb_captures  # noqa: F401  they register
+from experiments.reliability import (  # noqa: F401  they register
+    bomb_archives,
+    bomb_captures,
+    bomb_crowds,
+)
 from experiments.reliability.bomb_registry import BOMBS
 
 LIMIT = 6 << 30  # bytes of address space
-PATIENCE = 15  # CPU seconds after which a process is killed
+SLOW = 20  # so many times the CPU seconds that it may take, a process is killed by the clock
 
 
 @dataclass(frozen=True)
@@ -49,9 +53,10 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="parts of the names of bombs; all by default")
     parser.add_argument("--seconds", type=float, default=2.0)
     parser.add_argument("--mebibytes", type=float, default=500.0)
+    parser.add_argument("--patience", type=int, default=15, help="CPU seconds until it is killed")
     asked = parser.parse_args()
     _import_all()
-    idle = _in_child(lambda: None)
+    idle = _in_child(lambda: None, asked.patience)
     bad = total = 0
     print("bomb | command | status | CPU s | MiB | last line")
     print("---|---|---|---|---|---")
@@ -62,7 +67,7 @@ def main() -> None:
             path = bomb.make(Path(folder))
             for command in bomb.commands:
                 words = [_filled(word, path, folder) for word in command.split()]
-                one = _in_child(lambda words=words: _facert(words), idle)
+                one = _in_child(lambda words=words: _facert(words), asked.patience, idle)
                 wrong = one.is_bad(asked.seconds, asked.mebibytes)
                 bad, total = bad + wrong, total + 1
                 row = f"{name} | {command} | {one.status} | {one.seconds:.1f} | {one.mebibytes:.0f}"
@@ -96,18 +101,18 @@ def _facert(words: Sequence[str]) -> None:
     facert()
 
 
-def _in_child(work: Callable[[], None], idle: Outcome | None = None) -> Outcome:
+def _in_child(work: Callable[[], None], patience: int, idle: Outcome | None = None) -> Outcome:
     """Run something in a process of its own; `idle` is what one takes that does nothing."""
     with tempfile.TemporaryFile("w+") as said:
         child = os.fork()
         if not child:
-            _run(work, said.fileno())
+            _run(work, patience, said.fileno())
         begin = time.monotonic()
         while True:
             done, status, used = os.wait4(child, os.WNOHANG)
             if done:
                 break
-            if time.monotonic() - begin > 4 * PATIENCE:
+            if time.monotonic() - begin > SLOW * patience:
                 os.kill(child, signal.SIGKILL)
             time.sleep(0.01)
         said.seek(0)
@@ -121,12 +126,12 @@ def _in_child(work: Callable[[], None], idle: Outcome | None = None) -> Outcome:
     return Outcome(code, seconds - idle.seconds, mebibytes - idle.mebibytes, last)
 
 
-def _run(work: Callable[[], None], said: int) -> None:
+def _run(work: Callable[[], None], patience: int, said: int) -> None:
     """Do the work in a child, whose output goes to a file, and end it."""
     os.dup2(said, 1)
     os.dup2(said, 2)
     resource.setrlimit(resource.RLIMIT_AS, (LIMIT, LIMIT))
-    resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE, PATIENCE + 1))
+    resource.setrlimit(resource.RLIMIT_CPU, (patience, patience + 1))
     status = 0
     try:
         work()
