@@ -76,10 +76,9 @@ class MotionFactors(ArrayGroup):
         """
         seen = ~np.isnan(X)
         weight = seen / self.noise
-        q = self.weights.shape[1]
-        squares = (self.weights[:, :, None] * self.weights[:, None, :]).reshape(-1, q * q)
+        q = self.count
         pull = (np.where(seen, X - self.mean, 0.0) * weight) @ self.weights
-        return (weight @ squares).reshape(-1, q, q), pull
+        return (weight @ self._squares).reshape(-1, q, q), pull
 
     def posterior(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n, q) and covariance (n, q, q) of each frame's factors, regardless of time."""
@@ -93,7 +92,13 @@ class MotionFactors(ArrayGroup):
 
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Variance of W z, (n, d), for covariances of the factors, (n, q, q)."""
-        return np.asarray(np.einsum("nkd,dk->nd", covariance @ self.weights.T, self.weights))
+        return np.asarray(covariance.reshape(len(covariance), -1) @ self._squares.T)
+
+    @property
+    def _squares(self) -> FloatArray:
+        """Products of each column's weights with each other, (d, q²)."""
+        W = self.weights
+        return np.asarray((W[:, :, None] * W[:, None, :]).reshape(len(W), -1))
 
     @property
     def count(self) -> int:
