@@ -123,7 +123,10 @@ def _write(take: Take, path: Path, overwrite: bool) -> Path:
         write_take_file(take, path, overwrite)
     except InputError as error:
         instead = _free(path.with_name(f"{path.name}.h5"))
-        write_take_file(take, instead)
+        try:
+            write_take_file(take, instead)
+        except InputError:  # the disk is full, say: that is not about this format
+            raise error from None
         log.warning("written to %s instead: %s", instead, error)
         return instead
     return path

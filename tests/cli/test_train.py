@@ -412,3 +412,20 @@ def test_for_a_method_that_learns_in_one_go_a_start_is_idle(facert, take, model,
     assert done.code == 0
     assert "ridge learns in one go: nothing to do for --start" in done.err
     assert "does not use" not in done.err  # nobody chose what the start has filled in
+
+
+def test_what_learns_in_one_go_reports_that_nothing_is_kept(
+    facert, make_take, tmp_path, monkeypatch
+):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    take, model = tmp_path / "take.h5", tmp_path / "m.safetensors"
+    api.write_take(make_take(), take)
+    monkeypatch.setattr(api, "train", interrupted)
+    stopped = facert("train", take, "-o", model, "--method", "ridge")
+    assert stopped.code == 130
+    assert stopped.err.endswith(
+        "stopped: nothing is kept of what learns in one go; the same command begins anew\n"
+    )
+    assert list(tmp_path.iterdir()) == [take]

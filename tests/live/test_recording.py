@@ -217,10 +217,11 @@ def test_when_the_disk_is_full_the_frames_before_stay(recordings, tmp_path, capl
     try:
         for frame in WEIGHTS[1:]:
             record.add(frame)
-        with pytest.raises(InputError, match=r"All frames are in .*in\.h5\.recording"):
+        with pytest.raises(InputError, match=r"All frames are in .*in\.h5\.recording") as failed:
             files.write("")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert failed.value.where == str(tmp_path / "in.h5")
     assert "recorded no further than 4 frames: File too large" in caplog.text
     files.close()
     assert len(read_take_file(record.recording)) == 4

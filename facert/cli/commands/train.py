@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
@@ -173,7 +174,8 @@ def command(
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
-    with reading(listed_files(paths)), ProgressBar() as bar:
+    kept = nullcontext() if stepwise else _noting_loss()
+    with kept, reading(listed_files(paths)), ProgressBar() as bar:
         retargeter = facert.train(
             takes, settings, Monitors(*monitors, bar), begin, corrections_only=corrections_only
         )
@@ -186,6 +188,16 @@ def command(
     if status == "interrupted":
         console.log.warning("stopped; --resume continues")
         raise typer.Exit(signals.status)
+
+
+@contextmanager
+def _noting_loss() -> Iterator[None]:
+    """Note for who stops what learns in one go that nothing of it is kept."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        stop.add_note("nothing is kept of what learns in one go; the same command begins anew")
+        raise
 
 
 def _settings(begin: Retargeter | None, config: Path | None, options: dict[str, Any]) -> Settings:
