@@ -33,14 +33,16 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# Where linear algebra decides: these pass with the kernels of any processor, by one thread and two.
+# Where linear algebra decides: these pass with the kernels of any processor. By two threads those
+# that do not train: models are trained by one thread, whatever is set.
 NUMERICAL := $(addprefix tests/,models methods preprocess topology retarget regions mesh posing)
+TWO_THREADS := $(addprefix tests/,topology mesh models/test_threads.py methods/test_regressions.py)
 KERNELS = $(BIN)/python -m experiments.reliability.processors
-PYTEST = $(BIN)/python -m pytest -n 2 --dist worksteal
+PYTEST = $(BIN)/python -m pytest
 
 kernels: $(VENV)/.installed
-	$(KERNELS) --only avx2,sse,old --threads 1 -- $(PYTEST) $(NUMERICAL)
-	$(KERNELS) --only avx512,avx2,sse --threads 2 -- $(PYTEST) -m 'not real' $(NUMERICAL)
+	$(KERNELS) --only avx512,avx2,sse -- $(PYTEST) -n 2 --dist worksteal -m 'not real' $(NUMERICAL)
+	$(KERNELS) --only avx512,avx2,sse --threads 2 -- $(PYTEST) -m 'not real' $(TWO_THREADS)
 
 # The same with the lowest versions that pyproject.toml allows. Torch is the one of constraints.txt:
 # others are several gigabytes. Where the packages cannot be had, pip says why and nothing is tested.
@@ -53,7 +55,7 @@ lowest:
 	else echo "skipped: the lowest versions of dependencies cannot be installed here"; fi
 
 test-lowest: $(VENV)/.installed
-	$(KERNELS) --only avx2 -- $(PYTEST) -m 'not real' $(NUMERICAL) tests/data tests/io
+	$(KERNELS) --only avx2 -- $(PYTEST) -n 2 --dist worksteal -m 'not real' $(NUMERICAL) tests/data tests/io
 
 check: $(VENV)/.installed
 	$(BIN)/ruff format --check .
