@@ -12,7 +12,7 @@ from experiments.reliability.bomb_registry import BOMBS, TAKE, Bomb, each
 from experiments.reliability.bomb_scenes import Scene, png
 from experiments.reliability.bomb_tables import honest, markers
 
-MESH = ("drive DIR/points.csv DIR/out.h5 --mesh FILE",)
+MESH = ("drive FILE DIR/points.csv DIR/out.h5 --auto",)
 
 
 def trc(value: object = 1.0, rate: object = 25, time: object = None, count: int = 3) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from facert.data.memory import VARIABLE
 from facert.data.take import Source
+from facert.models.gaussian import Gaussian, fill_gaps
 from facert.preprocess.faults import find_faults
 from facert.preprocess.faults.prediction import PART, TOGETHER, parts_of
 from facert.preprocess.head_motion import stable_markers
@@ -61,3 +62,17 @@ def test_stable_markers_of_a_scan_are_sought_among_some(scan: np.ndarray) -> Non
         tracemalloc.stop()
     assert len(chosen) == 180
     assert np.isin(np.linspace(0, 699, 600).round()[260:340], chosen).all()
+
+
+def test_gaps_of_many_columns_are_filled_by_those_beside(
+    scan: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    X = scan.reshape(40, -1)[:, :600]
+    gaps = np.random.default_rng(0).random(X.shape) < 0.02
+    shown = np.where(gaps, np.nan, X)
+    whole = Gaussian.of(shown).fill(shown)
+    monkeypatch.setenv(VARIABLE, "8M")  # less than a covariance of all takes
+    filled = fill_gaps(shown)
+    np.testing.assert_array_equal(filled[~gaps], X[~gaps])
+    errors = [np.sqrt(np.mean((one - X)[gaps] ** 2)) for one in (filled, whole)]
+    assert errors[0] < 1.05 * errors[1]
