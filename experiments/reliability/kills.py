@@ -87,6 +87,8 @@ COMMANDS = {
         "retarget take.h5 r.h5 -m ridge.safetensors --overwrite", "r.h5", _read_take
     ),
     "convert": Command("convert take.h5 c.glb --rig rig.h5 --overwrite", "c.glb", _read_take),
+    "clean": Command("clean take.h5 k.h5 --overwrite", "k.h5", _read_take),
+    "propagate": Command("propagate take.h5 n.h5 --every 10 --overwrite", "n.h5", _read_take),
     "eval": Command(
         "eval take.h5 --methods ridge,nearest --labels 4,5,6 --repeats 4 --unlabelled 4 --jobs 2"
         " --json e.json --overwrite",

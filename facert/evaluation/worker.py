@@ -8,13 +8,16 @@ import pickle
 import signal
 import sys
 from queue import SimpleQueue
-from threading import Thread
+from threading import Thread, Timer
+from types import FrameType
 from typing import Any, BinaryIO, NoReturn
 
+from facert.data.raising import can_raise
 from facert.errors import FacertError
 
 LENGTH = 8  # bytes in front of a message that say how long it is
 ENDED = 128 + signal.SIGTERM
+AGAIN = 0.02  # seconds until it is tried again to end
 
 
 def send(pipe: BinaryIO | Any, message: bytes) -> None:
@@ -90,5 +93,7 @@ def _end_with(parent: int) -> None:
             os._exit(ENDED)
 
 
-def _end(*_: object) -> NoReturn:
-    raise SystemExit(ENDED)
+def _end(number: int, frame: FrameType | None) -> None:
+    if can_raise(frame):
+        raise SystemExit(ENDED)
+    Timer(AGAIN, os.kill, (os.getpid(), number)).start()

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from io import FileIO
 
+CALLED_BY_C = True
+"""HDF5 calls this module, and an exception would not get through: a signal is raised later."""
+
 
 class HDF5Output:
     """The bytes of a new HDF5 file, whose first error waits until the file is closed.

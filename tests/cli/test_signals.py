@@ -55,6 +55,17 @@ compare = kind(lambda a, b: ask() or 0)
 class Thing: pass
 """
 
+HDF5 = """
+import io, tempfile
+from pathlib import Path
+from facert.io.atomic import NewBytes
+from facert.io.hdf5 import create
+NewBytes.write = lambda self, content: (ask(), io.FileIO.write(self, content))[1]
+def write():
+    with tempfile.TemporaryDirectory() as folder, create(Path(folder, "a.h5"), "a", 1, False):
+        pass
+"""
+
 
 def run(place, before="", number="signal.SIGTERM", **options):
     code = PROGRAM.format(number=number, place=place, before=before)
@@ -71,8 +82,9 @@ def run(place, before="", number="signal.SIGTERM", **options):
         ("ctypes.CDLL(None).qsort((ctypes.c_int * 2)(), 2, 4, compare)", CALLBACK),
         ("thing = Thing(); seen = weakref.ref(thing, lambda _: ask()); del thing", CALLBACK),
         ("[0].sort(key=lambda _: ask())", ""),
+        ("write()", HDF5),
     ],
-    ids=["code", "destructor", "import", "callback of C", "weak reference", "inside C"],
+    ids=["code", "destructor", "import", "callback of C", "weak reference", "inside C", "HDF5"],
 )
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 def test_a_signal_is_raised_where_python_code_can_take_it(place, before, number):

@@ -3,8 +3,11 @@
 import os
 import signal
 import time
+from pathlib import Path
 
 from facert.errors import InputError
+from facert.io.atomic import NewBytes
+from facert.io.hdf5 import create
 
 
 def deed(folder, name, deaths=0):
@@ -31,6 +34,20 @@ def cleaning_up(folder, name):
         file.unlink()
 
 
-def reason_of(_folder, name, *rest):
+def reason_of(_folder, *rest):
     """What is returned in place of a deed that was never done."""
-    return f"{name}: {rest[-1]}"
+    return ": ".join(map(str, rest if len(rest) == 1 else (rest[0], rest[-1])))
+
+
+def ended_while_writing(folder):
+    """Be asked to end while HDF5 writes a file."""
+    write = NewBytes.write
+
+    def asked(self, content):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return write(self, content)
+
+    NewBytes.write = asked
+    with create(Path(folder, f"{os.getpid()}.h5"), "a", 1, False):
+        pass
+    time.sleep(5.0)

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from calls import deed, reason_of, refuse
+from calls import deed, ended_while_writing, reason_of, refuse
 
 from facert.errors import FacertError, InputError
 from facert.evaluation.processes import call_each
@@ -32,6 +32,12 @@ def test_a_process_that_dies_costs_its_call_alone(tmp_path):
     once, ever = sorted((one, other), key=len)  # whichever died first
     assert (once, ever[:47]) == ("once", "ever: a process was killed; it ended by SIGKILL")
     assert len(list(tmp_path.glob("ever-*"))) == 2
+
+
+def test_a_process_that_is_asked_to_end_while_it_writes_ends_clean(tmp_path, capfd):
+    for reason in call_each(ended_while_writing, [(tmp_path,), (tmp_path,)], 2, lost=reason_of):
+        assert "ended with status 143" in reason
+    assert capfd.readouterr().err == ""
 
 
 def test_what_a_call_raises_is_raised_here(capfd):

@@ -18,6 +18,8 @@ import threading
 import time
 from contextlib import contextmanager, suppress
 
+from facert.data.raising import can_raise
+
 TYPE_CHECKING = False  # as in typing, which takes its time
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -103,7 +105,7 @@ class Signals:
         elif not self._is_working:
             self._end()
         else:
-            self._unraised = not _can_raise(frame)
+            self._unraised = not can_raise(frame)
             if not self._unraised:
                 raise Stopped
 
@@ -142,16 +144,6 @@ class Signals:
         with suppress(OSError):
             os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + b"stopped\n")
         os._exit(self.status)
-
-
-def _can_raise(frame: FrameType | None) -> bool:
-    """Whether an exception gets through from here: not out of imports and destructors."""
-    while frame is not None:
-        code = frame.f_code
-        if code.co_filename.startswith("<frozen importlib") or code.co_name == "__del__":
-            return False
-        frame = frame.f_back
-    return True
 
 
 signals = Signals()
