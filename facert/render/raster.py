@@ -1,13 +1,18 @@
-"""Triangles to pixels: a z-buffer in numpy, all triangles at once."""
+"""Triangles to pixels: a z-buffer in numpy, as many triangles at once as memory should hold."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.errors import InputError
 
+MAX_LAYERS = 32
+"""So often triangles may cover the whole picture: a head with eyes, teeth and hair does 4 times."""
+_BATCH = 2**20  # pixels that triangles drawn at once may cover
 _HAIR = 1e-9  # pixels, and weights
 _FAR = 1e9
 _Pair = tuple[FloatArray, FloatArray]
@@ -63,8 +68,7 @@ def rasterise(
     """
     corners = np.ascontiguousarray(pixels.T)[:, faces.T]  # (column, row or depth; corner; F)
     area = _area(corners)
-    hits = _hits(corners, area, size)
-    hits, depth = _nearest(hits, hits.interpolate(corners[2]), size)
+    hits, depth = _nearest_of_all(corners, area, size)
     covered = np.zeros(size * size, dtype=bool)
     covered[hits.pixel] = True
     inside = area[hits.face] > 0  # rows grow downwards: anticlockwise triangles have area < 0
@@ -84,6 +88,45 @@ def _area(corners: FloatArray) -> FloatArray:
     (ax, bx, cx), (ay, by, cy), _ = corners
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     return np.where(np.abs(area) < _HAIR, 0, area)
+
+
+def _nearest_of_all(corners: FloatArray, area: FloatArray, size: int) -> tuple[_Hits, FloatArray]:
+    """Nearest hit of each pixel to the viewer, in the order of the image, and its depth."""
+    front = np.full(size * size, -np.inf)
+    face = np.full(size * size, -1)
+    weights = np.zeros((2, size * size))
+    for part in _batches(corners, area, size):
+        hits = _hits(corners[:, :, part], area[part], size)
+        hits, depth = _nearest(hits, hits.interpolate(corners[2][:, part]), size)
+        nearer = depth >= front[hits.pixel]
+        hits, depth = hits[nearer], depth[nearer]
+        front[hits.pixel], face[hits.pixel] = depth, hits.face + part.start
+        weights[:, hits.pixel] = hits.first, hits.second
+    shown = np.flatnonzero(face >= 0)
+    return _Hits(face[shown], shown, *weights[:, shown]), front[shown]
+
+
+def _batches(corners: FloatArray, area: FloatArray, size: int) -> Iterator[slice]:
+    """Iterate over triangles that are drawn at once, by how many pixels they may cover.
+
+    Raises `InputError` for triangles that cover the picture more often than a face's.
+    """
+    wide, high = (
+        np.clip(part.max(axis=0), -1, size) - np.clip(part.min(axis=0), -1, size) + 1
+        for part in corners[:2]
+    )
+    most = np.where(area == 0, 0, np.minimum(wide * high, np.abs(area) / 2 + wide + high))
+    covered = np.cumsum(np.nan_to_num(most))
+    if len(most) and covered[-1] > MAX_LAYERS * size**2 + 9 * len(most):
+        found = f"{covered[-1] / size**2:.0f} layers of triangles"
+        fix = "Merge what lies in the same place, or leave it out."
+        raise InputError("faces", f"at most {MAX_LAYERS} above each other", found, fix)
+    start = 0
+    while start < len(most):
+        reached = covered[start - 1] if start else 0.0
+        stop = max(start + 1, int(np.searchsorted(covered, reached + _BATCH)))
+        yield slice(start, stop)
+        start = stop
 
 
 def _hits(corners: FloatArray, area: FloatArray, size: int) -> _Hits:
