@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facert.errors import InputError
+from facert.io.gltf.container import MAX_VALUES, MOST
 from facert.io.gltf.document import open_gltf
 from facert.io.gltf.rig import read_gltf_rig
 from facert.io.gltf.take import read_gltf_take
@@ -73,6 +74,26 @@ HOSTILE = {
     "another version": at("asset", "version")("1.0"),
     "compression": at("extensionsRequired")(["KHR_draco_mesh_compression"]),
 }
+
+
+MANY = {
+    "values": at("extras")([0] * (MAX_VALUES + 1)),
+    "nodes": at("nodes")([{"mesh": 0}] + [{}] * MOST["nodes"]),
+    "children": at("nodes", 0, "children")([0] * (MOST["children"] + 1)),
+    "meshes": at("nodes")([{"mesh": 0}] * (MOST["meshes"] + 1)),
+    "channels": at("animations")([{"channels": [0] * (MOST["channels"] + 1), "samplers": []}]),
+}
+
+
+@pytest.mark.parametrize("what", MANY)
+def test_more_than_a_character_has_is_refused_before_it_is_walked(
+    tmp_path: Path, what: str
+) -> None:
+    path = tmp_path / "face.glb"
+    rewritten(path, MANY[what])
+    for read in (read_gltf_rig, read_gltf_take):
+        with pytest.raises(InputError, match=f"{what}.*: expected at most"):
+            read(path)
 
 
 @pytest.mark.parametrize("what", HOSTILE)

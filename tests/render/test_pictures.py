@@ -13,6 +13,7 @@ from facert.data.rig import MeshSequence, Rig
 from facert.data.take import Controls, Source, Take
 from facert.errors import InputError
 from facert.mesh.normals import vertex_normals
+from facert.render import raster
 from facert.render.faces import choose_frames, control_settings, posed_face
 from facert.render.plots import plot_controls
 from facert.render.raster import rasterise
@@ -67,6 +68,25 @@ def test_the_nearer_triangle_hides_the_other() -> None:
     for faces in (np.vstack([FRONT, FRONT + 4]), np.vstack([FRONT + 4, FRONT])):
         red, _, blue, _ = shade(vertices, faces, CAMERA, 32, colours)[16, 16]
         assert blue > 5 * red
+
+
+def test_triangles_in_parts_make_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    pixels, values = rng.uniform(-10, 42, (60, 3)), rng.normal(size=(60, 3))
+    faces = rng.integers(0, 60, (80, 3))
+    monkeypatch.setattr(raster, "MAX_LAYERS", 80)
+    whole = rasterise(pixels, values, values, faces, 32)
+    monkeypatch.setattr(raster, "_BATCH", 100)
+    parts = rasterise(pixels, values, values, faces, 32)
+    for name in ("covered", "depth", "normal", "colour", "inside"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_a_thousand_layers_over_each_other_are_refused() -> None:
+    """They would take gibibytes, and show nothing but the first."""
+    with pytest.raises(InputError, match=r"faces: expected at most 32 above each other, found \d+"):
+        shade(SQUARE, np.tile(FRONT, (1000, 1)), CAMERA, 64)
+    assert shade(SQUARE, np.tile(FRONT, (30, 1)), CAMERA, 64)[32, 32, 3] == 1
 
 
 @settings(deadline=None, max_examples=25)

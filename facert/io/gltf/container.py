@@ -18,6 +18,10 @@ from facert.io.gltf.uris import data_of, file_of
 from facert.io.guarded import moderate_file, read_beginning, read_text, values_in
 
 MAGIC, JSON, BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+MAX_VALUES = 2**20
+"""Most values of the JSON: of a whole character there are 100,000."""
+MOST = {"nodes": 2**15, "children": 2**15, "meshes": 2**12, "channels": 2**15}
+"""Most nodes, nodes below others, parts of meshes that nodes show, and channels of animations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +75,35 @@ def read_container(path: Path) -> Container:
     if read_beginning(path, 4) == struct.pack("<I", MAGIC):
         memory.require(path.stat().st_size, "file")
         text, own, others = _chunks(path.read_bytes())
-        memory.require(CELL * values_in(text), "JSON")
     else:
-        text, own, others = read_text(path), None, b""
+        text, own, others = read_text(path).encode(), None, b""
+    values = values_in(text)
+    _require_count("values of the JSON", values, MAX_VALUES)
+    memory.require(CELL * values, "JSON")
     root = parse_json_object(text)
+    for name, count in _counts(root).items():
+        _require_count(name, count, MOST[name])
     if not str(root["asset"]["version"]).startswith("2"):
         raise InputError("asset version", "2.0", repr(root["asset"]), "Export it as glTF 2.0.")
     return Container(root, path, own, others, memory)
+
+
+def _counts(root: dict[str, Any]) -> dict[str, int]:
+    """How many there are of what each takes its time."""
+    nodes, meshes = root.get("nodes", []), root.get("meshes", [])
+    sizes = [len(mesh["primitives"]) for mesh in meshes]
+    return {
+        "nodes": len(nodes),
+        "children": sum(len(node.get("children", [])) for node in nodes),
+        "meshes": sum(sizes[node["mesh"]] for node in nodes if "mesh" in node),
+        "channels": sum(len(one["channels"]) for one in root.get("animations", [])),
+    }
+
+
+def _require_count(name: str, count: int, most: int) -> None:
+    if count > most:
+        fix = "Export the character alone, with the animation that you need."
+        raise InputError(name, f"at most {most}", f"{count}", fix)
 
 
 def is_left_out(buffer: dict[str, Any]) -> bool:
