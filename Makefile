@@ -10,7 +10,7 @@ DEMO ?= build/demo
 # How long `make fuzz` takes, over all targets.
 MINUTES ?= 10
 
-.PHONY: demo test kernels lowest test-lowest check format docs bench figures acceptance mutants fuzz clean
+.PHONY: demo test kernels lowest test-lowest check format docs bench figures acceptance mutants fuzz dist clean
 
 # Versions of dependencies, and which extra is installed.
 CONSTRAINTS ?= constraints.txt
@@ -70,6 +70,22 @@ format: $(VENV)/.installed
 docs: $(VENV)/.installed
 	$(BIN)/python docs/make_api.py
 	$(BIN)/python docs/make_tables.py
+
+build/clean/.made: pyproject.toml constraints.txt
+	rm -rf build/clean
+	$(PYTHON) -m venv build/clean
+	touch $@
+
+# A source distribution, the wheel that it builds, and a take that goes the whole way with the wheel
+# in an environment of its own.
+dist: $(VENV)/.installed build/clean/.made
+	rm -rf dist
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt build
+	PIP_CONSTRAINT=$(CURDIR)/constraints.txt $(BIN)/python -m build --outdir dist
+	build/clean/bin/python -m pip install --quiet --constraint constraints.txt dist/*.whl
+	build/clean/bin/python -m pip install --quiet --force-reinstall --no-deps dist/*.whl
+	build/clean/bin/python -m pip check
+	build/clean/bin/python -I .ci/wheel.py dist/*.tar.gz dist/*.whl
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m experiments.bench
