@@ -10,7 +10,7 @@ DEMO ?= build/demo
 # How long `make fuzz` takes, over all targets.
 MINUTES ?= 10
 
-.PHONY: demo test kernels lowest test-lowest check format docs bench figures acceptance mutants fuzz dist clean
+.PHONY: demo test kernels lowest test-lowest check format docs bench figures acceptance mutants fuzz site dist clean
 
 # Versions of dependencies, and which extra is installed.
 CONSTRAINTS ?= constraints.txt
@@ -70,6 +70,17 @@ format: $(VENV)/.installed
 docs: $(VENV)/.installed
 	$(BIN)/python docs/make_api.py
 	$(BIN)/python docs/make_tables.py
+
+# The pages of the repository as a site, in build/site: links and their places are checked, and nothing
+# in it is loaded from elsewhere. To look at it: python -m http.server -d build/site
+SHOWN := README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md CITATION.cff LICENSE docs data experiments
+
+site: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
+	mkdir -p build/pages
+	ln -sfn $(addprefix $(CURDIR)/,$(SHOWN)) build/pages
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 build/clean/.made: pyproject.toml constraints.txt
 	rm -rf build/clean

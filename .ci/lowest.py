@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-TOOLS = ("dev", "test", "bench", "fuzz")  # extras of those who work on facert
+TOOLS = ("dev", "test", "bench", "fuzz", "docs")  # extras of those who work on facert
 
 
 def canonical(name: str) -> str:
