@@ -7,6 +7,7 @@ texture coordinates, normals, groups and materials are left aside.
 from __future__ import annotations
 
 import logging
+from array import array
 from itertools import pairwise
 from pathlib import Path
 
@@ -60,23 +61,23 @@ def read_obj(path: Path) -> Mesh:
 
 def _vertices_and_faces(path: Path) -> tuple[FloatArray, IntArray]:
     """The vertices (V, 3) and the triangles (F, 3) of one OBJ file."""
-    vertices: list[list[float]] = []
-    triangles: list[list[int]] = []
+    vertices, triangles = array("d"), array("q")
     with reading(path):
         for number, line in enumerate(read_old_text(path).splitlines(), start=1):
             keyword, *fields = line.split() or ("",)
             try:
                 if keyword == "v":
                     x, y, z = map(float, fields[:3])  # a weight or colours may follow
-                    vertices.append([x, y, z])
+                    vertices.extend((x, y, z))
                 elif keyword == "f":
-                    triangles += _fan([_vertex(field, len(vertices)) for field in fields])
+                    count = len(vertices) // 3
+                    triangles.extend(_fan([_vertex(field, count) for field in fields]))
             except ValueError:
                 field, expected = f"line {number}", "v X Y Z or f A B C ..."
                 raise InputError(field, expected, repr(line[:60]), "Export it again.") from None
         if not vertices:
             raise InputError("file", "vertices", "none", "Export the mesh again.")
-    return np.array(vertices), np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    return np.array(vertices).reshape(-1, 3), np.array(triangles).reshape(-1, 3)
 
 
 def _read_shape(path: Path, neutral: FloatArray, faces: IntArray) -> FloatArray:
@@ -101,8 +102,8 @@ def _vertex(corner: str, count: int) -> int:
     return position
 
 
-def _fan(corners: list[int]) -> list[list[int]]:
-    """Triangles of a polygon, all at its first corner."""
+def _fan(corners: list[int]) -> list[int]:
+    """Triangles of a polygon, all at its first corner, one after the other."""
     if len(corners) < 3:
         raise ValueError("a face has three corners or more")
-    return [[corners[0], *pair] for pair in pairwise(corners[1:])]
+    return [corner for pair in pairwise(corners[1:]) for corner in (corners[0], *pair)]

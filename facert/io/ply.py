@@ -8,6 +8,8 @@ triangle fans.
 
 from __future__ import annotations
 
+import struct
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.memory import FileMemory
 from facert.data.rig import Mesh
 from facert.errors import InputError, reading
 from facert.io.guarded import moderate_file
 
 MAX_HEADER = 2**16
 MAX_RAGGED = 2**22
-"""Most rows of an element whose rows differ in length: they are read one by one."""
+"""Most rows of an element whose rows differ in length: each is looked for by itself."""
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
@@ -30,12 +33,14 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 _LENGTH = "length of "
+_COPIES = 6  # of the file's size: the content, its numbers, corners and triangles as they grow
 _CORNERS = ("vertex_indices", "vertex_index")
 _COLOURS = ("red", "green", "blue")
 
 _Field = tuple[str, str, tuple[int, ...]]
-Columns = dict[str, NDArray[np.generic] | list[NDArray[np.generic]]]
-"""The values of each property: an array, or a list of arrays where rows differ in length."""
+_Part = tuple[IntArray, NDArray[np.generic]]
+Columns = dict[str, list[_Part]]
+"""The values of each property: rows whose lists are equally long, and their values in an array."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,9 @@ def read_ply(path: Path) -> Mesh:
     Raises `InputError` naming the file, and the line of the header or the element that is at fault.
     """
     with reading(path):
-        content = moderate_file(path).read_bytes()
+        memory = FileMemory(moderate_file(path))
+        memory.require(_COPIES * path.stat().st_size, "file")
+        content = path.read_bytes()
         end = _end_of_header(content)
         elements, text = _parse_header(content[:end])
         body = _as_float64(content[end:]) if text else content[end:]
@@ -102,9 +109,11 @@ def _parse_header(content: bytes) -> tuple[list[_Element], bool]:
 def _as_float64(body: bytes) -> bytes:
     """Bytes of a text file's numbers as in a binary file whose types are all float64."""
     try:
-        return np.array(body.split(), dtype="<f8").tobytes()
-    except ValueError as error:
-        raise InputError("data", "numbers", str(error), "Export the mesh again.") from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # of what is no number
+            return np.fromstring(body, "<f8", sep=" ").tobytes()
+    except (ValueError, DeprecationWarning):
+        raise InputError("data", "numbers", "other words", "Export the mesh again.") from None
 
 
 def _read_elements(elements: list[_Element], body: bytes, text: bool) -> dict[str, Columns]:
@@ -112,7 +121,7 @@ def _read_elements(elements: list[_Element], body: bytes, text: bool) -> dict[st
     for element in elements:
         try:
             found[element.name], offset = _read_element(element, body, offset, text)
-        except (ValueError, OverflowError):
+        except (ValueError, OverflowError, struct.error):
             field, expected = f"element {element.name}", f"{element.count} whole rows"
             damage = "fewer or damaged ones"
             raise InputError(field, expected, damage, "Export it again.") from None
@@ -120,7 +129,7 @@ def _read_elements(elements: list[_Element], body: bytes, text: bool) -> dict[st
 
 
 def _read_element(element: _Element, body: bytes, offset: int, text: bool) -> tuple[Columns, int]:
-    """Read an element: all rows at once if their lists are equally long, else one by one."""
+    """Read an element: all rows at once if their lists are equally long."""
     names = [one.name for one in element.properties]
     if not element.count or not names:
         return {}, offset
@@ -129,15 +138,61 @@ def _read_element(element: _Element, body: bytes, offset: int, text: bool) -> tu
         rows = np.frombuffer(body, dtype, element.count, offset)
         lengths = [rows[name] for name in dtype.names or () if name.startswith(_LENGTH)]
         if all((length == length[0]).all() for length in lengths):
-            return {name: rows[name] for name in names}, offset + rows.nbytes
+            every = np.arange(len(rows))
+            return {name: [(every, rows[name])] for name in names}, offset + rows.nbytes
     if element.count > MAX_RAGGED or not any(one.length for one in element.properties):
         raise ValueError("too many rows, or too few bytes")
-    ragged = []
-    for _ in range(element.count):
-        dtype = _row_type(element, body, offset, text)
-        ragged.append(np.frombuffer(body, dtype, 1, offset)[0])
-        offset += dtype.itemsize
-    return {name: [np.atleast_1d(row[name]) for row in ragged] for name in names}, offset
+    return _read_ragged(element, body, offset, text)
+
+
+def _read_ragged(element: _Element, body: bytes, offset: int, text: bool) -> tuple[Columns, int]:
+    """Read rows whose lists differ in length: those that are alike at once."""
+    starts, lengths, end = _find_rows(element, body, offset, text)
+    content = np.frombuffer(body, np.uint8)
+    columns: Columns = {one.name: [] for one in element.properties}
+    for rows in _alike(lengths):
+        dtype = _row_type(element, body, int(starts[rows[0]]), text)
+        windows = np.lib.stride_tricks.sliding_window_view(content, dtype.itemsize)
+        values = windows[starts[rows]].view(dtype)[:, 0]
+        for name, parts in columns.items():
+            parts.append((rows, values[name]))
+    return columns, end
+
+
+def _find_rows(
+    element: _Element, body: bytes, offset: int, text: bool
+) -> tuple[IntArray, IntArray, int]:
+    """Where each row begins (n,), the lengths of its lists (n, lists), and where the last ends."""
+    order = ">" if any(one.type[0] == ">" for one in element.properties) else "<"
+    steps, before = [], 0  # of each list: bytes before it, its length's type and size, a value's
+    for one in element.properties:
+        size = np.dtype("<f8" if text else one.type).itemsize
+        if one.length:
+            kind = struct.Struct(order + np.dtype("<f8" if text else one.length).char)
+            steps.append((before, kind.unpack_from, kind.size, size))
+        before = 0 if one.length else before + size
+    starts = np.empty(element.count, dtype=np.int64)
+    lengths = np.empty((element.count, len(steps)), dtype=np.int64)
+    for row in range(element.count):
+        starts[row] = offset
+        for place, (skipped, unpack, width, size) in enumerate(steps):
+            offset += skipped
+            lengths[row, place] = length = _length(int(unpack(body, offset)[0]))
+            offset += width + length * size
+        offset += before
+    if offset > len(body):
+        raise ValueError("too few bytes")
+    return starts, lengths, offset
+
+
+def _alike(lengths: IntArray) -> list[IntArray]:
+    """The rows of equal lengths (n, lists), group by group."""
+    group = np.zeros(len(lengths), dtype=np.int64)
+    for column in lengths.T:
+        _, here = np.unique(column, return_inverse=True)
+        _, group = np.unique(group * (here.max() + 1) + here, return_inverse=True)
+    order = np.argsort(group, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(group))[:-1])
 
 
 def _row_type(element: _Element, body: bytes, offset: int, text: bool) -> np.dtype[np.void]:
@@ -178,9 +233,15 @@ def _mesh(columns: dict[str, Columns], elements: list[_Element]) -> Mesh:
 
 
 def _stacked(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
-    if not all(name in columns for name in names):
+    """Numbers of every row (n, names); None where one has none, or a list."""
+    parts = [part for name in names for part in columns.get(name, [(None, None)])]
+    if any(values is None or values.ndim > 1 for _, values in parts):
         return None
-    return np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names])
+    found = np.empty((sum(len(rows) for rows, _ in columns[names[0]]), len(names)))
+    for place, name in enumerate(names):
+        for rows, values in columns[name]:
+            found[rows, place] = values
+    return found
 
 
 def _brightest(elements: list[_Element]) -> float:
@@ -190,12 +251,12 @@ def _brightest(elements: list[_Element]) -> float:
     return float(np.iinfo(red).max) if red.kind in "iu" else 1.0
 
 
-def _triangles(corners: NDArray[np.generic] | list[NDArray[np.generic]]) -> IntArray:
-    """Triangle fans (F, 3) of polygons."""
-    if isinstance(corners, np.ndarray):
-        return _fans(corners)
-    parts = [_fans(polygon[None]) for polygon in corners]
-    return np.concatenate(parts) if parts else np.empty((0, 3), dtype=np.int64)
+def _triangles(corners: list[_Part]) -> IntArray:
+    """Triangle fans (F, 3) of polygons, in the order of the rows."""
+    fans = [np.empty((0, 3), dtype=np.int64), *(_fans(polygons) for _, polygons in corners)]
+    rows = [np.repeat(rows, max(0, values.shape[1] - 2)) for rows, values in corners]
+    order = np.argsort(np.concatenate([np.empty(0, dtype=np.int64), *rows]), kind="stable")
+    return np.concatenate(fans)[order]
 
 
 def _fans(corners: NDArray[np.generic]) -> IntArray:
