@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import MAX_NAMES, FloatArray
 from facert.data.text import from_csv, plural
 from facert.errors import InputError
 from facert.io.guarded import encoding_of, existing_file, read_text
@@ -20,6 +20,8 @@ from facert.io.guarded import encoding_of, existing_file, read_text
 log = logging.getLogger("facert")
 
 MAX_HEADER = 2**20
+MAX_COLUMNS = 3 * MAX_NAMES + 64
+"""Those of markers, and of clocks, counters and flags beside them."""
 _PREAMBLE = 20  # lines before the header, at most
 SEPARATORS = ",;\t"
 _ALIKE = 20  # rows before the last one that it is compared with
@@ -45,14 +47,26 @@ class Line(NamedTuple):
         return InputError(where, expected, found, "Mend or remove the line.")
 
 
+def require_few(columns: int) -> None:
+    """Refuse more columns than the most markers have.
+
+    Raises `InputError` that names the header.
+    """
+    if columns > MAX_COLUMNS:
+        found, fix = f"{columns}", "Leave out what is not of the face."
+        raise InputError("header", f"at most {MAX_COLUMNS} columns", found, fix)
+
+
 def read_lines(path: Path, separator: str) -> list[Line]:
     """Read the lines of a text file, their cells stripped of blanks.
 
-    Raises `InputError` when the file cannot be read.
+    Raises `InputError` when the file cannot be read, or a line has too many of them.
     """
+    lines = read_text(path).splitlines()
+    require_few(max((line.count(separator) for line in lines), default=0))
     return [
         Line(number, [cell.strip() for cell in line.split(separator)])
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
+        for number, line in enumerate(lines, start=1)
     ]
 
 

@@ -24,6 +24,8 @@ from facert.io.guarded import door, read_text
 
 REGIONS_EXAMPLE = '[brows] with markers = ["M1", "M2"] and controls = ["browInnerUp"] below'
 DRIVERS_EXAMPLE = '[[eyeLookInLeft]] with node = "eye_L" and rotate = [0, 25, 0] below'
+MAX_SIZE = 2**20
+"""Most characters, of a file that a person writes: each table takes its time."""
 WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _PARTS = 32
@@ -42,6 +44,8 @@ def read_toml(path: Path, example: str = "name = value") -> dict[str, Any]:
     with door(path):
         try:
             text = read_text(path)
+            if len(text) > MAX_SIZE:
+                raise ValueError(f"more than {MAX_SIZE} characters")
             if _LONG_KEY.search(text):
                 raise ValueError(f"a key of more than {_PARTS} parts")
             return tomllib.loads(text)

@@ -26,7 +26,7 @@ from facert.data.take import Source, Take
 from facert.data.text import plural, printable
 from facert.errors import InputError, reading
 from facert.io.guarded import read_old_text
-from facert.io.lines import Line, to_numbers, with_points, without_cut_end
+from facert.io.lines import Line, require_few, to_numbers, with_points, without_cut_end
 
 log = logging.getLogger("facert")
 
@@ -48,6 +48,8 @@ def read_trc(path: Path) -> Take:
     """
     with reading(path):
         texts = read_old_text(path).splitlines()
+        # Tabs may be doubled: then as many columns have nothing in them.
+        require_few(max((text.count("\t") - text.count("\t\t") for text in texts), default=0))
         lines = [(number, text) for number, text in enumerate(texts, start=1) if text.strip()]
         head = next((i for i, (_, text) in enumerate(lines[:8]) if _LEAD.match(text)), 3)
         facts = _facts(lines, head)

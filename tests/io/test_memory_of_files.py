@@ -81,6 +81,12 @@ BOMBS: dict[str, tuple[str, Any, str]] = {
     "a hole, as glTF": (".gltf", hole, "a hole of zeros"),
     "commas": (".csv", "time,a\n" + "," * 3_000_000, "file: .*--max-memory"),
     "an open list": (".json", "[" * 3_000_000, "file: .*--max-memory"),
+    "shapes": (".txt", "info,x\nbs," + "a," * 60_000 + "\n", "at most 49216 columns"),
+    "markers": (
+        ".trc",
+        "PathFileType\t4\t(X/Y/Z)\tx\nDataRate\n25\nFrame#\tTime" + "\ta" * 60_000,
+        "at most 49216 columns",
+    ),
     "columns": (".csv", ",".join(map(str, range(60_000))) + "\n1\n", "at most 49216 columns"),
 }
 

@@ -63,3 +63,10 @@ def test_a_key_of_very_many_parts_is_refused_at_once(tmp_path, part):
     assert time.process_time() - began < 1
     path.write_text(f'{".".join(["a"] * 20)} = "{"." * 100}" # {"." * 100}\n')
     assert list(read_toml(path)) == ["a"]
+
+
+def test_a_file_of_a_hundred_thousand_tables_is_refused_before_it_is_parsed(tmp_path):
+    path = tmp_path / "regions.toml"
+    path.write_text("".join(f'[t{i}]\nmarkers=["a"]\n' for i in range(100_000)))
+    with pytest.raises(InputError, match="more than 1048576 characters"):
+        read_regions(path)

@@ -38,6 +38,7 @@ from facert.io.lines import (
     check_width,
     parse_csv,
     read_header,
+    require_few,
     to_numbers,
     without_cut_end,
 )
@@ -45,7 +46,7 @@ from facert.io.tables.coordinates import markers_among
 from facert.io.tables.curve_table import is_curve_table, read_csv_curves
 from facert.io.tables.livelink import is_livelink, read_livelink
 from facert.io.tables.marker_header import marker_header
-from facert.io.tables.table import Table, is_number, is_text, require_few, table_of_lines
+from facert.io.tables.table import Table, is_number, is_text, table_of_lines
 from facert.io.tables.table_take import Reading, take_of_table, unlogged
 
 LARGEST = 1.797693134e308

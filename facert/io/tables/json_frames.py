@@ -15,7 +15,7 @@ from typing import Any
 
 from facert.data.column_names import Role, role_of_name
 from facert.errors import InputError
-from facert.io.tables.table import require_few
+from facert.io.lines import require_few
 
 log = logging.getLogger("facert")
 

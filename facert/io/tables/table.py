@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import MAX_NAMES, FloatArray, IntArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.errors import InputError
-from facert.io.lines import Line, check_width, to_numbers
+from facert.io.lines import Line, check_width, require_few, to_numbers
 
 _TRUTHS = {
     **{"true": "1", "false": "0", "yes": "1", "no": "0", "": "nan"},
@@ -19,10 +19,6 @@ _TRUTHS = {
 }
 # No number, whatever the language: it has a letter, or the parts of a time of day or a date.
 _TEXT = re.compile(r".*([^\W\d_]|:|\d;\d).*|\d{4}-\d\d?-\d\d?|\d{1,4}/\d{1,2}/\d{1,4}", re.DOTALL)
-
-
-MAX_COLUMNS = 3 * MAX_NAMES + 64
-"""Those of markers, and of clocks, counters and flags beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +51,6 @@ class Table:
         """The error for a cell."""
         where = f"{self.place(row)}, column {self.names[column]}"
         return InputError(where, expected, found, "Mend or remove it.")
-
-
-def require_few(columns: int) -> None:
-    """Refuse more columns than the most markers have.
-
-    Raises `InputError` that names the header.
-    """
-    if columns > MAX_COLUMNS:
-        found, fix = f"{columns}", "Leave out what is not of the face."
-        raise InputError("header", f"at most {MAX_COLUMNS} columns", found, fix)
 
 
 def table_of_lines(header: Sequence[str], rows: Sequence[Line]) -> Table:

@@ -25,9 +25,10 @@ from facert.data.text import listed, plural
 from facert.errors import InputError, reading
 from facert.io.curves import holds_curves, take_of_curves
 from facert.io.guarded import read_text
+from facert.io.lines import require_few
 from facert.io.tables.curve_table import is_json_curve_table, take_of_json_curves
 from facert.io.tables.json_frames import Frame, Number, frames_of, has_times, parsed, rate_of
-from facert.io.tables.table import Table, require_few
+from facert.io.tables.table import Table
 from facert.io.tables.table_take import Reading, take_of_table
 
 log = logging.getLogger("facert")
