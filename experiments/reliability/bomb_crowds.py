@@ -5,11 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from experiments.reliability.bomb_registry import BOMBS, Bomb
+from facert.data.rig import Rig
+from facert.io.rig import write_rig
 
+RIG = "--rig DIR/rig.h5"
 ALONE = ("clean FILE DIR/out.h5", "stabilise FILE DIR/out.h5", "suggest FILE -n 3",
-         "render FILE DIR/out.png", "plot FILE DIR/out.png")  # fmt: skip
+         f"render FILE DIR/out.png {RIG}", "plot FILE DIR/out.png",
+         "propagate FILE DIR/out.h5", "points suggest DIR/rig.h5 -n 5",
+         "train FILE -o DIR/model.safetensors --method ridge",
+         "retarget FILE DIR/out.h5 --model DIR/model.safetensors",
+         "eval FILE --methods ridge --labels 10")  # fmt: skip
 
 
 def crowd(folder: Path, markers: int, frames: int, gaps: float) -> Path:
@@ -24,9 +32,15 @@ def crowd(folder: Path, markers: int, frames: int, gaps: float) -> Path:
     values = places + np.einsum("tk,kmi->tmi", factors, ways)
     values += 0.05 * rng.normal(size=values.shape)
     values[rng.random(values.shape[:2]) < gaps] = np.nan
+    poses = factors[:, :2].copy()
+    poses[np.arange(frames) % (frames // 12) > 0] = np.nan
+    shapes = np.stack([np.outer(near[0], ways[0, 0]), np.outer(near[1], ways[1, 0])])
+    hull = ConvexHull(places).simplices
+    write_rig(Rig(places, shapes, ("a", "b"), hull), folder / "rig.h5")
     path = folder / "bomb.npz"
     names = np.array([f"m{i}" for i in range(markers)])
-    np.savez(path, markers=values.astype(np.float32), marker_names=names, fps=np.array(25.0))
+    source = {"markers": values.astype(np.float32), "marker_names": names, "fps": np.array(25.0)}
+    np.savez(path, **source, poses=poses, pose_names=np.array(["a", "b"]))
     return path
 
 

@@ -24,6 +24,7 @@ from experiments.reliability import (  # noqa: F401  they register
     bomb_archives,
     bomb_captures,
     bomb_crowds,
+    bomb_models,
 )
 from experiments.reliability.bomb_registry import BOMBS
 

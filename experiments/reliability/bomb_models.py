@@ -1,0 +1,88 @@
+"""Hostile models and mesh sequences: little that declares much; see `bomb_registry`."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from experiments.reliability.bomb_registry import BOMBS, READ, Bomb, write_take
+from experiments.reliability.bomb_tables import honest, markers
+
+MODEL = ("inspect FILE", "retarget DIR/take.csv DIR/out.h5 --model FILE")
+SEQUENCE = ("inspect FILE", "render FILE DIR/out.png", "convert FILE DIR/out.glb",
+            "render FILE DIR/out.png --beside FILE")  # fmt: skip
+FOLDER = (*READ, "render DIR/take.h5 DIR/out.png --rig FILE",
+          "drive FILE/neutral.obj DIR/points.csv DIR/out.h5 --auto")  # fmt: skip
+
+
+def model(shape: list[int], kept: int, claimed: int | None = None) -> Callable[[Path], Path]:
+    """A model whose only tensor has so many bytes, which are a hole, or claims so."""
+
+    def make(folder: Path) -> Path:
+        (folder / "take.csv").write_text(honest())
+        tensor = {"dtype": "F64", "shape": shape, "data_offsets": [0, claimed or kept]}
+        head = json.dumps({"__metadata__": {"format": "facert-model"}, "a": tensor}).encode()
+        path = folder / "bomb.safetensors"
+        with path.open("wb") as file:
+            file.write(struct.pack("<Q", len(head)) + head)
+            file.truncate(8 + len(head) + kept)
+        return path
+
+    return make
+
+
+def sequence(frames: int, vertices: int, faces: int, packed: bool) -> Callable[[Path], Path]:
+    """A mesh sequence of zeros that were never written, or are compressed."""
+
+    def make(folder: Path) -> Path:
+        path = folder / "bomb.h5"
+        kept: dict[str, Any] = {"compression": "gzip", "chunks": True} if packed else {}
+        with h5py.File(path, "w", libver="latest") as file:
+            file.attrs.update(format="facert-mesh-sequence", format_version=1, fps=25.0, units="m")
+            file["time"] = np.arange(frames) / 25
+            file.create_dataset("faces", (faces, 3), "i4", **kept)
+            file.create_dataset("neutral", (vertices, 3), "f8", **kept)
+            file.create_dataset("vertices", (frames, vertices, 3), "f4", **kept)
+        return path
+
+    return make
+
+
+def obj_folder(vertices: int, shapes: int) -> Callable[[Path], Path]:
+    """A rig of OBJ files of many vertices and one triangle."""
+
+    def make(folder: Path) -> Path:
+        write_take(folder)
+        (folder / "points.csv").write_text(markers(6, 10))
+        made = folder / "bomb"
+        made.mkdir()
+        text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "v 1 2 3\n" * vertices + "f 1 2 3\n"
+        for name in ("neutral", *(f"s{i}" for i in range(shapes))):
+            (made / f"{name}.obj").write_text(text)
+        return made
+
+    return make
+
+
+for name, make in {
+    "a tensor of 8 TB": model([10**9, 1000], 100, 8 * 10**12),
+    "a tensor of 4 GB that is a hole": model([5 * 10**8], 4 * 10**9),
+    "a tensor of 10^18 by 0": model([10**18, 0], 8, 8),
+    "10^5 dimensions": model([1] * 100_000, 8),
+}.items():
+    BOMBS[f"model {name}"] = Bomb(make, MODEL)
+for name, make in {
+    "5 million vertices, never written": sequence(4, 5_000_000, 1, False),
+    "5 million vertices, packed": sequence(4, 5_000_000, 1, True),
+    "a million frames": sequence(1_000_000, 3, 1, False),
+    "5 million triangles": sequence(4, 3, 5_000_000, True),
+}.items():
+    BOMBS[f"sequence of {name}"] = Bomb(make, SEQUENCE)
+BOMBS["obj folder of 300,000 vertices, 3 shapes"] = Bomb(obj_folder(300_000, 3), FOLDER)
+BOMBS["obj folder of 3 vertices, 5,000 shapes"] = Bomb(obj_folder(0, 5_000), FOLDER)
