@@ -256,7 +256,8 @@ def _faults(command: Command, folder: Path, ended: Ended, number: signal.Signals
 
 
 def _results(command: Command, folder: Path) -> list[object]:
-    return [command.read(path) for path in sorted(folder.glob(command.outputs))]
+    found = sorted(folder.glob(command.outputs))
+    return [command.read(path) for path in found if not path.name.startswith(".")]
 
 
 def main(arguments: Sequence[str]) -> None:
