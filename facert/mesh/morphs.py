@@ -95,9 +95,8 @@ def _displacements(sequence: MeshSequence) -> Iterator[tuple[slice, FloatArray]]
 def _mix(sequence: MeshSequence, size: int, seed: int) -> tuple[FloatArray, float]:
     """Random mixtures (size, 3V) of the frames, and the largest displacement of a vertex."""
     frames = len(sequence)
-    mixing = np.eye(frames)
-    if size < frames:
-        mixing = np.random.default_rng(seed).normal(size=(frames, size))
+    rng = np.random.default_rng(seed)
+    mixing = rng.normal(size=(frames, size)) if size < frames else np.eye(frames)
     mixtures, motion = np.zeros((size, sequence.neutral.vertices.size)), 0.0
     for rows, moved in _displacements(sequence):
         mixtures += mixing[rows].T @ moved

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_fill_holes, uniform_filter
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.data.rig import CLAY
+from facert.data.rig import CLAY, require_extent
 from facert.mesh.normals import vertex_normals
 from facert.render.raster import Surface, rasterise
 
@@ -47,7 +47,11 @@ class Camera:
 
 
 def frame_mesh(vertices: FloatArray, yaw: float = 0.0) -> Camera:
-    """A camera that shows a whole mesh (V, 3) with a little air around it."""
+    """A camera that shows a whole mesh (V, 3) with a little air around it.
+
+    Raises `InputError` when all of it lies in one place, as seen from the front.
+    """
+    require_extent(vertices[:, :2])
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     x, y, z = (low + high) / 2
     return Camera((x, y, z), 0.53 * float((high - low)[:2].max()), yaw)

@@ -66,10 +66,13 @@ def relative_residuals(
 
 def unexplained(frames: FloatArray, posed: FloatArray) -> FloatArray:
     """What posed frames (l, d) leave of frames (T, d), the residual r above."""
-    centre = posed.mean(axis=0)
-    square = (posed - centre).T @ (posed - centre)
-    ridge = max(RIDGE * float(np.trace(square)) / len(posed), np.finfo(np.float64).tiny)
-    return np.linalg.solve(square / ridge + np.eye(len(square)), (frames - centre).T).T
+    A, moved = posed - posed.mean(axis=0), frames - posed.mean(axis=0)
+    ridge = RIDGE * float(np.square(A).sum()) / len(A)
+    ridge = max(ridge, np.finfo(np.float64).tiny)
+    if len(A) < A.shape[1]:  # μ (AᵀA + μ I)⁻¹ = I - Aᵀ (AAᵀ + μ I)⁻¹ A, of the smaller side
+        weights = np.linalg.solve(A @ A.T + ridge * np.eye(len(A)), A @ moved.T)
+        return np.asarray(moved - weights.T @ A)
+    return np.linalg.solve(A.T @ A / ridge + np.eye(A.shape[1]), moved.T).T
 
 
 def relative_lengths(residuals: FloatArray, variance: FloatArray, kind: SourceKind) -> FloatArray:

@@ -109,6 +109,11 @@ def test_the_camera_sees_the_whole_mesh() -> None:
     assert ((pixels[:, :2] >= 0) & (pixels[:, :2] <= 99)).all()
 
 
+def test_a_mesh_in_one_place_cannot_be_shown() -> None:
+    with pytest.raises(InputError, match="/neutral: expected vertices apart from each other"):
+        frame_mesh(np.ones((3, 3)))
+
+
 def test_chosen_frames_differ_and_run_in_order() -> None:
     poses = np.repeat(np.eye(3), 10, axis=0)
     poses[4] = np.nan

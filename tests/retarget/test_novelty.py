@@ -1,4 +1,5 @@
 import logging
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,11 @@ from facert import Settings
 from facert.io.formats import read_take_file
 from facert.retarget.novelty import (
     NEW,
+    RIDGE,
     novelty_warning,
     relative_residuals,
     relevance,
+    unexplained,
     usual_variance,
 )
 from facert.retarget.source_reasons import unlike
@@ -175,3 +178,20 @@ def test_a_gaze_of_which_no_control_knows_makes_no_frame_new(posed_weights):
         other[:, column] += 3.0
         amounts.append(unlike(other, model).amounts.mean())
     assert max(amounts[2:4]) < NEW < amounts[4]
+
+
+def test_residuals_are_the_same_by_the_smaller_side():
+    """Eq. of the module; of thousands of columns their square would fill the memory."""
+    rng = np.random.default_rng(0)
+    for labels, columns in ((8, 30), (40, 30)):
+        posed, frames = rng.normal(size=(labels, columns)), rng.normal(size=(5, columns))
+        A = posed - posed.mean(axis=0)
+        square = A.T @ A
+        ridge = RIDGE * np.trace(square) / labels
+        shrunk = ridge * np.linalg.inv(square + ridge * np.eye(columns))
+        expected = (frames - posed.mean(axis=0)) @ shrunk
+        np.testing.assert_allclose(unexplained(frames, posed), expected, rtol=0, atol=1e-12)
+    tracemalloc.start()
+    unexplained(np.ones((3, 4000)), rng.normal(size=(4, 4000)))
+    assert tracemalloc.get_traced_memory()[1] < 5 << 20
+    tracemalloc.stop()
