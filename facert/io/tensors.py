@@ -93,11 +93,11 @@ def write_tensors(
     document = json.dumps(head | asdict(metadata), sort_keys=True, allow_nan=False)
     if len(document) > MAX_HEADER:
         raise _damaged("the header", f"at most {MAX_HEADER} bytes", f"{len(document)}")
-    # Not save_file: it makes the file readable by its owner alone, whatever the umask.
-    content = save(contiguous, {_KEY: document})
     with replacing(path, overwrite) as temporary:
         with NewBytes(temporary, "x") as file:
-            file.write(content)
+            # Not save_file: it makes the file readable by its owner alone, whatever the umask. Not
+            # kept, as a check takes as much again.
+            file.write(save(contiguous, {_KEY: document}))
         if check is not None:
             check(temporary)
 
