@@ -19,6 +19,7 @@ from facert.data.limits import SEVERAL, beyond, known_poses_of
 from facert.data.spelling import words
 from facert.data.take import Take
 from facert.data.text import listed, plural
+from facert.errors import InputError
 from facert.preprocess.faults.absurd import NATURAL
 from facert.preprocess.faults.quantiles import quantile
 
@@ -84,15 +85,19 @@ def warn_of_labels(take: Take, name_of: Callable[[int], str] = str) -> None:
 
     `name_of` is what people are shown of a frame's number, where the take is several.
 
-    Raises `InputError` for poses in a unit that nothing can be computed in.
+    Raises `InputError` for poses in a unit that nothing can be computed in, naming one such number.
     """
     if take.params is None or take.controls is None or not len(take.labels):
         return
     controls, values = take.controls, take.params[take.labels]
+    frames = [name_of(frame) for frame in take.labels.tolist()]
+    for row, column in np.argwhere(np.abs(values) > LARGEST)[:1].tolist():
+        where = f"the pose of frame {frames[row]}, {controls.names[column]}"
+        found, fix = f"{values[row, column]:.3g}", "Mend the pose, or check the units."
+        raise InputError(where, "a number of a sensible size", found, fix)
     require_size(values, "/target/params")
     if take.animation is not None:
         require_size(take.animation, "/animation/params")
-    frames = [name_of(frame) for frame in take.labels.tolist()]
     labels = _Labels(controls.names, frames, values, controls.limits, take.animation)
     rows = _rows_in_percent(labels)
     columns = _large_columns(labels, rows)

@@ -76,8 +76,8 @@ def train(
         nonlocal progress, kept, due
         progress = Progress(state, (*progress.curve, state.value))
         over = converged()
-        kept = kept if over else progress
         monitor.iteration(state)
+        kept = kept if over else progress  # when it is logged: a run may be ended at any moment
         if not over and time.perf_counter() >= due:
             monitor.checkpoint(kept)
             due = time.perf_counter() + checkpoint_seconds
