@@ -7,7 +7,7 @@ import gc
 import logging
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,7 +22,8 @@ _WORK = re.compile(
 MAX_BYTES = 2**29
 """Largest file that is read as a whole: half a gibibyte."""
 _COPIES = 3  # of a text are in memory: its bytes, its characters, its lines
-_SEPARATORS = (b",", b";", b":", b"\t", b"\n", b"[", b"{")
+JSON_SEPARATORS = (b",", b":", b"[", b"{")
+_SEPARATORS = (*JSON_SEPARATORS, b";", b"\t", b"\n")
 """Each is one value more, in tables and in JSON."""
 _ZEROS = 2**20
 """Bytes of 0 that a text may have, as one that a power cut ended does; more are a hole."""
@@ -146,9 +147,9 @@ def _require_text(path: Path) -> None:
     memory.require(CELL * values, "file")
 
 
-def values_in(text: bytes) -> int:
+def values_in(text: bytes, separators: Sequence[bytes] = _SEPARATORS) -> int:
     """How many values a table or JSON holds at most, about, by what separates them."""
-    return sum(map(text.count, _SEPARATORS))
+    return sum(map(text.count, separators))
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Callable
 from contextlib import suppress
@@ -122,6 +123,16 @@ def test_a_hostile_animation_is_one_error(tmp_path: Path, change: Any) -> None:
     with pytest.raises(InputError) as caught:
         read_gltf_take(path)
     assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_indentation_by_tabs_is_no_value(tmp_path: Path) -> None:
+    with open_gltf(BLENDER) as document:
+        root = json.loads(json.dumps(document.root))
+        data = base64.b64encode(document.buffers[0]).decode()
+    root["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{data}"
+    root["extras"] = [[[0] * 1000] * (MAX_VALUES // 2000)]
+    (tmp_path / "face.gltf").write_text(json.dumps(root, indent="\t"))
+    assert read_gltf_rig(tmp_path / "face.gltf").names == ("smile", "blink")
 
 
 def test_nodes_that_are_each_others_children_end(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from facert.errors import InputError
 from facert.io.curves import parse_json_object
 from facert.io.gltf.compression import MESHOPT
 from facert.io.gltf.uris import data_of, file_of
-from facert.io.guarded import moderate_file, read_beginning, read_text, values_in
+from facert.io.guarded import JSON_SEPARATORS, moderate_file, read_beginning, read_text, values_in
 
 MAGIC, JSON, BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 MAX_VALUES = 2**20
@@ -77,7 +77,7 @@ def read_container(path: Path) -> Container:
         text, own, others = _chunks(path.read_bytes())
     else:
         text, own, others = read_text(path).encode(), None, b""
-    values = values_in(text)
+    values = values_in(text, JSON_SEPARATORS)  # lines and tabs, as Blender indents, are none
     _require_count("values of the JSON", values, MAX_VALUES)
     memory.require(CELL * values, "JSON")
     root = parse_json_object(text)
