@@ -15,14 +15,16 @@ ITERATIONS = 5
 RIDGE = 1e-6  # relative to the mean variance
 TOGETHER = 384
 """Columns that gaps are filled by together."""
+BLIND = 0.5  # share of a part's columns that a frame hides
 CHUNK = 2_000_000  # numbers in the systems that are solved at once
 
 
 def fill_gaps(X: FloatArray) -> FloatArray:
     """Replace every NaN by its conditional mean under a Gaussian fitted to all frames.
 
-    Of more than `TOGETHER` columns each is filled by what stands beside it: one Gaussian of all
-    takes the square of their number in memory, and the cube in time.
+    One Gaussian of all columns takes the square of their number in memory, and the cube in time. Of
+    more than `TOGETHER` each is filled by what stands beside it; where a frame hides most of that,
+    by columns from everywhere, as a region that is hidden says nothing of itself.
 
     Parameters
     ----------
@@ -36,8 +38,20 @@ def fill_gaps(X: FloatArray) -> FloatArray:
     """
     if not np.isnan(X).any():
         return X
-    parts = np.array_split(X, -(-X.shape[1] // TOGETHER), axis=1)
-    return np.hstack([Gaussian.of(part).fill(part) for part in parts])
+    filled = X.copy()
+    for part in _parts(np.isnan(X)):
+        filled[:, part] = Gaussian.of(X[:, part]).fill(X[:, part])
+    return filled
+
+
+def _parts(hidden: BoolArray) -> list[IntArray]:
+    """Columns that are filled together, where (n, d) are hidden."""
+    columns = np.arange(hidden.shape[1])
+    count = -(-len(columns) // TOGETHER)
+    beside = np.array_split(columns, count)
+    some = hidden[~hidden.all(axis=1)]
+    blind = any((some[:, part].mean(axis=1) > BLIND).any() for part in beside)
+    return [columns[k::count] for k in range(count)] if blind else beside
 
 
 @dataclass(frozen=True, eq=False)

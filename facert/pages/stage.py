@@ -18,7 +18,7 @@ from facert.mesh.caps import caps_of
 from facert.mesh.normals import vertex_normals
 from facert.pages.paint import LEVELS, MOST, Paint, skin
 from facert.render.faces import Face
-from facert.render.shade import DARK, frame_mesh
+from facert.render.shade import DARK, frame_points
 
 if TYPE_CHECKING:
     from viser import CameraHandle, ClientHandle, MeshHandle, ViserServer
@@ -59,7 +59,7 @@ class Part:
     def _fit(self, points: FloatArray) -> None:
         """Scale it to points (n, 3)."""
         require_bounded(points, "/source/markers")
-        camera = frame_mesh(points)
+        camera = frame_points(points)
         self._centre, self._scale = np.array(camera.centre), 0.5 / max(camera.reach, 1e-9)
         self.width = float(np.ptp(points[:, 0])) * self._scale
 

@@ -52,7 +52,12 @@ def frame_mesh(vertices: FloatArray, yaw: float = 0.0) -> Camera:
     Raises `InputError` when all of it lies in one place, as seen from the front.
     """
     require_extent(vertices[:, :2])
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return frame_points(vertices, yaw)
+
+
+def frame_points(points: FloatArray, yaw: float = 0.0) -> Camera:
+    """A camera that shows points (V, 3) with a little air around them; its reach may be 0."""
+    low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = (low + high) / 2
     return Camera((x, y, z), 0.53 * float((high - low)[:2].max()), yaw)
 

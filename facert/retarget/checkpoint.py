@@ -33,6 +33,7 @@ _MEMORIES: tuple[set[str], ...] = (
     {"gradient", "direction", "scalars"},  # of scaled conjugate gradients
     {"begin", "scalars", "values", "gradients"},  # of L-BFGS within a stage
 )
+_OF_STAGE = {"stage", "of_stage", "y"}  # beside it, of a conditioned stage
 
 
 @dataclass(frozen=True)
@@ -211,10 +212,12 @@ def _check_shapes(declared: Mapping[str, Shaped], metadata: CheckpointMetadata) 
     rows = found.get("values", ())
     known = {"begin": own["x"], "values": rows[:1], "gradients": rows[:1] + own["x"]}
     known |= {"gradient": own["x"], "direction": own["x"], "scalars": found.get("scalars", ())[:1]}
-    complete = set(found) in (set(), *_MEMORIES)
+    known |= {"stage": own["x"], "of_stage": (5,), "y": own["x"]}
+    staged = _OF_STAGE if "stage" in found else set()
+    complete = set(found) - staged in (set(), *_MEMORIES) and staged <= set(found)
     if not complete or any(shape != known[name] for name, shape in found.items()):
         expected = f"the state of a search for {own['x'][0]} numbers"
-        raise InputError(_MEMORY + "...", expected, f"{found}", "Train anew.")
+        raise InputError("the arrays memory.*", expected, ", ".join(found), "Train anew.")
 
 
 def _progress(arrays: Mapping[str, FloatArray]) -> Progress:

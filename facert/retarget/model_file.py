@@ -21,6 +21,7 @@ from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.take import Controls, SourceKind
 from facert.data.typed import require_type
+from facert.data.version import VERSION
 from facert.errors import InputError, NumericalError, reading
 from facert.io.guarded import parsing
 from facert.io.tensors import FIX, read_tensors, write_tensors
@@ -329,7 +330,8 @@ def _units(arrays: Mapping[str, FloatArray], view: str) -> Normalisation:
 
 def library_versions() -> dict[str, str]:
     """Versions of the libraries that computed a result, for its metadata."""
-    return {name: version(name) for name in ("facert", "torch", "numpy", "scipy")}
+    others = {name: version(name) for name in ("torch", "numpy", "scipy")}
+    return {"facert": VERSION, **others}
 
 
 def _misfit(field: str, expected: str, found: str) -> InputError:

@@ -76,3 +76,12 @@ def test_gaps_of_many_columns_are_filled_by_those_beside(
     np.testing.assert_array_equal(filled[~gaps], X[~gaps])
     errors = [np.sqrt(np.mean((one - X)[gaps] ** 2)) for one in (filled, whole)]
     assert errors[0] < 1.05 * errors[1]
+
+
+def test_a_hidden_region_of_many_markers_is_filled_by_the_others() -> None:
+    rng = np.random.default_rng(0)
+    frames = rng.normal(size=(120, 6)) @ rng.normal(size=(6, 3 * 130))
+    gappy = frames.copy()
+    gappy[:60, : 3 * 70] = np.nan
+    strays = (fill_gaps(gappy) - frames)[:60, : 3 * 70]
+    assert np.sqrt(np.mean(strays**2)) < 0.3 * frames.std()

@@ -2,9 +2,13 @@ import logging
 
 import numpy as np
 import pytest
+from scipy.optimize import rosen, rosen_der, rosen_hess
 
 from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.io.tensors import write_tensors
+from facert.models.optim.arrow import Arrow
+from facert.models.optim.conditioned import Conditioned
+from facert.models.optim.lbfgs import LBFGS
 from facert.models.optim.monitor import Monitor, Progress
 from facert.models.optim.optimiser import State
 from facert.models.optim.scg import SCG
@@ -20,6 +24,16 @@ from facert.retarget.checkpoint import (
 
 def bowl(x):
     return float(x @ x), 2.0 * x
+
+
+class Valley:
+    """Rosenbrock's function, which knows its second derivatives."""
+
+    def __call__(self, x):
+        return rosen(x), rosen_der(x)
+
+    def curvature(self, x):
+        return Arrow([], np.arange(len(x))).add(np.arange(len(x)), rosen_hess(x))
 
 
 def go_on(state):
@@ -56,6 +70,18 @@ def test_the_progress_of_an_optimiser_comes_back_whole(path, progress):
     np.testing.assert_array_equal(found.state.x, progress.state.x)
     assert found.state.memory.keys() == progress.state.memory.keys()
     for name, array in progress.state.memory.items():
+        np.testing.assert_array_equal(found.state.memory[name], array)
+
+
+@pytest.mark.parametrize("inner", [SCG(), LBFGS()])
+def test_the_progress_within_a_conditioned_stage_comes_back_whole(path, inner):
+    states, search, valley = [], Conditioned(inner), Valley()
+    search.advance(valley, search.start(valley, np.linspace(-1.5, -0.5, 6)), 60, states.append)
+    within = next(state for state in states if "stage" in state.memory)
+    save(path, Progress(within, (5.0, within.value)))
+    found = CheckpointFile(path, resume=True).resume("a")
+    assert found.state.memory.keys() == within.memory.keys()
+    for name, array in within.memory.items():
         np.testing.assert_array_equal(found.state.memory[name], array)
 
 
