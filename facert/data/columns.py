@@ -96,7 +96,7 @@ def roles_of(
     names: Sequence[str], values: FloatArray, time: FloatArray, sparse: bool = False
 ) -> dict[int, Role]:
     """The columns (T, D) that are no weights, by name or else by shape; see `weight_columns`."""
-    values = np.clip(values, -_HUGE, _HUGE)  # shapes are told from differences and their squares
+    values = np.clip(values, -_HUGE, _HUGE)  # shapes are judged by differences and their squares
     named = {column: role_of_name(name) for column, name in enumerate(names)}
     roles = {
         column: role

@@ -21,7 +21,7 @@ class StoredBytes:
     So there is an allowance in proportion to the file, and whoever is led in circles, or to the
     same place again and again, uses it up. A file may be large, as holes take no room on a disk:
     so nodes, which lead to others, are visited once, and structures are of moderate size. Checksums
-    are for accidents, as whatever passes them is doubted all the same: the first are computed.
+    are for accidents, as whatever passes them is checked all the same: the first are computed.
     """
 
     def __init__(self, file: BinaryIO, size: int) -> None:

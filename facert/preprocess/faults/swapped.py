@@ -16,7 +16,7 @@ AT_ONCE = 4_000_000
 MANY = 200
 """Markers, beyond which a tree of them finds the nearest sooner than all distances do."""
 MOST = 0.5
-"""Where more of what was seen stands in doubt, markers move too far to be told apart by it."""
+"""Where more of what was seen is suspect, markers move too far to be separated by it."""
 
 
 @dataclass(frozen=True, eq=False)
