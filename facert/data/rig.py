@@ -29,6 +29,7 @@ from facert.data.arrays import (
 from facert.data.driven_nodes import DrivenNodes
 from facert.errors import InputError
 
+_FRAMES, _VERTICES = 64, 2**16  # at least, and of small meshes at most, in a batch
 CLAY = (0.80, 0.72, 0.66)
 """What is shown without colours of its own."""
 
@@ -118,8 +119,14 @@ class MeshSequence:
         """Number of frames T."""
         return len(self.time)
 
-    def batches(self, size: int = 64) -> Iterator[FloatArray]:
-        """Iterate over the frames in order as vertices (n, V, 3), at most `size` at once."""
+    @property
+    def batch(self) -> int:
+        """How many frames to take at once: the more, the smaller the mesh."""
+        return max(_FRAMES, _VERTICES // max(1, len(self.neutral.vertices)))
+
+    def batches(self, size: int | None = None) -> Iterator[FloatArray]:
+        """Iterate over the frames in order as vertices (n, V, 3), `batch` at once by default."""
+        size = size or self.batch
         for start in range(0, len(self), size):
             yield self.fetch(np.arange(start, min(start + size, len(self))))
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.data.memory import FLOAT, FileMemory
 from facert.data.rate import standard_rate
 from facert.data.take import Source, Take
 from facert.data.text import plural
@@ -31,6 +32,8 @@ log = logging.getLogger("facert")
 
 _KEY = 0x50
 """The second byte of every C3D file."""
+_POINT = 4 * (5 + 5 + 4) + FLOAT * 3
+"""Bytes of a point in a frame: position, residual and cameras, stacked, and what is kept of it."""
 _AXES = {f"{sign}{axis.upper()}": axis for sign in ("", "+") for axis in "xyz"}
 
 
@@ -47,7 +50,7 @@ def read_c3d(path: Path) -> Take:
         if file.read(2)[1:] != bytes([_KEY]):
             raise InputError("file", "a C3D file", "something else", "Export it again.")
         file.seek(0)
-        return _read(file)
+        return _read(file, FileMemory(path))
 
 
 @contextmanager
@@ -59,11 +62,11 @@ def _parsing() -> Iterator[None]:
         yield
 
 
-def _read(file: BinaryIO) -> Take:
+def _read(file: BinaryIO, memory: FileMemory) -> Take:
     from c3d import Reader
 
     reader = Reader(file)
-    points = _points(reader)
+    points = _points(reader, memory)
     labels, kept = _identified(_labels(reader), points.shape[1])
     positions, residual = points[:, kept, :3].astype(np.float64), points[:, kept, 3]
     positions[~(residual >= 0)] = np.nan
@@ -80,11 +83,13 @@ def _read(file: BinaryIO) -> Take:
     )
 
 
-def _points(reader: Reader) -> FloatArray:
+def _points(reader: Reader, memory: FileMemory) -> FloatArray:
     """Read all points of the file, (T, points, 5): position, residual, cameras."""
     declared = reader.last_frame - reader.first_frame + 1
     if reader.point_used < 1:  # frames without a point have no bytes: any number may be declared
         raise InputError("POINT:USED", "points", "none", "Export the markers as well.")
+    analog = reader.analog_used * reader.analog_per_frame
+    memory.require(max(0, declared) * _POINT * reader.point_used + FLOAT * analog, "frames")
     frames = [points for _, points, _ in reader.read_frames()]
     if not frames or len(frames) != declared:
         raise InputError("frames", f"{declared} as declared", f"{len(frames)}", "Export it again.")

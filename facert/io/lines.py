@@ -137,7 +137,11 @@ def parse_csv(text: str, separator: str = "") -> tuple[tuple[str, ...], list[Lin
     separator = separator or separator_of(next(filter(str.strip, lines), ""))
     reader = csv.reader(lines, delimiter=separator, strict=True)
     try:
-        rows = [Line(reader.line_num, cells) for cells in reader if "".join(cells).strip()]
+        rows = [
+            Line(reader.line_num, cells)
+            for cells in reader
+            if cells and (cells[0].strip() or "".join(cells).strip())
+        ]
     except csv.Error as error:
         line = f"line {reader.line_num}"
         raise InputError(line, "separated cells", str(error), "Export it again.") from error

@@ -20,7 +20,6 @@ from facert.data.rig import Mesh, MeshSequence, Rig
 from facert.errors import InputError
 
 TOLERANCE = 5e-3  # a fifth of a millimetre where a jaw opens by four centimetres
-BATCH = 64  # frames
 _FIRST_SIZE = 64
 
 
@@ -70,16 +69,17 @@ def compact_morphs(sequence: MeshSequence, tolerance: float = TOLERANCE, seed: i
     `tolerance` is how far a vertex of any frame may be off, as a share of the largest displacement
     of a vertex in the sequence; `seed` is for the random mixtures.
     """
-    size = min(_FIRST_SIZE, len(sequence))
+    most = min(len(sequence), sequence.neutral.vertices.size)  # there are no more directions
+    size = min(_FIRST_SIZE, most)
     while True:
         mixtures, motion = _mix(sequence, size, seed)
         basis, _ = np.linalg.qr(mixtures.T)  # (3V, size)
         weights, missed = _project(sequence, basis)
-        if missed <= 0.5 * tolerance * motion or size == len(sequence):
+        if missed <= 0.5 * tolerance * motion or size == most:
             break
-        size = min(2 * size, len(sequence))
+        size = min(2 * size, most)
     weights, basis = _directions(weights, basis)
-    count, dropped = _fewest(weights, basis, tolerance * motion - missed)
+    count, dropped = _fewest(weights, basis, tolerance * motion - missed, sequence.batch)
     return _scaled(sequence, weights[:, :count], basis[:, :count], missed + dropped)
 
 
@@ -126,12 +126,14 @@ def _directions(weights: FloatArray, basis: FloatArray) -> tuple[FloatArray, Flo
     return weights[:, order], basis[:, order]
 
 
-def _fewest(weights: FloatArray, basis: FloatArray, allowed: float) -> tuple[int, float]:
+def _fewest(
+    weights: FloatArray, basis: FloatArray, allowed: float, batch: int
+) -> tuple[int, float]:
     """Fewest leading directions within the allowed error, and a vertex's largest error then."""
     too_few, enough, error = 0, weights.shape[1], 0.0
     while enough - too_few > 1:
         middle = (too_few + enough) // 2
-        off = _dropped(weights[:, middle:], basis[:, middle:], allowed)
+        off = _dropped(weights[:, middle:], basis[:, middle:], allowed, batch)
         if off <= allowed:
             enough, error = middle, off
         else:
@@ -139,12 +141,12 @@ def _fewest(weights: FloatArray, basis: FloatArray, allowed: float) -> tuple[int
     return enough, error
 
 
-def _dropped(weights: FloatArray, basis: FloatArray, allowed: float) -> float:
+def _dropped(weights: FloatArray, basis: FloatArray, allowed: float, batch: int) -> float:
     """Largest error of a vertex without these directions, or the first one above `allowed`."""
     order = np.argsort(-np.sum(weights**2, axis=1))  # what is too far shows early
     farthest = 0.0
-    for start in range(0, len(weights), BATCH):
-        farthest = max(farthest, _largest(weights[order[start : start + BATCH]] @ basis.T))
+    for start in range(0, len(weights), batch):
+        farthest = max(farthest, _largest(weights[order[start : start + batch]] @ basis.T))
         if farthest > allowed:
             break
     return farthest

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from facert.data.arrays import FloatArray, IntArray, require_bounded
 from facert.data.drivers import require_used
 from facert.data.names import NameIndex, shape_drivers
-from facert.data.rig import MeshSequence, Rig
+from facert.data.rig import MeshSequence, Rig, require_extent
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.render.shade import Camera, frame_mesh, shade
@@ -203,6 +203,12 @@ def require_same_length(faces: Sequence[Face]) -> None:
                 f"{len(face.motion)}",
                 "Give faces of the same performance.",
             )
+
+
+def require_extents(faces: Sequence[Face]) -> None:
+    """Raise InputError for a face that lies in one place, as seen from the front."""
+    for face in faces:
+        require_extent(face.motion.neutral.vertices[: face.subject, :2])
 
 
 def require_part(part: range, length: int) -> None:

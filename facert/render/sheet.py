@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,8 @@ MAX_FRAMES = 40
 ACROSS = 5  # least pictures in a row of a contact sheet, if there are so many
 WIDE = 1.6  # width of a large contact sheet over its height
 TURNS = (0.0, -0.9)  # radians, of a face with points: from the front, and from the side
+_BARE: dict[str, Any] = {"xticks": [], "yticks": []}
+"""Of axes that are not shown: their ticks would take longer than a small face."""
 _POINT = "#b3261e"
 _POINTS_INCHES, _POINTS_RESOLUTION = 4.5, 150
 
@@ -75,7 +77,7 @@ def render_sheet(
     with_markers = take is not None and take.source.kind == "markers"
     height, width = len(faces) + with_markers + (video is not None), len(frames)
     figure = Figure(figsize=(CELL * width + 0.4, CELL * height + 0.3), dpi=pixels / CELL)
-    grid = figure.subplots(height, width, squeeze=False)
+    grid = figure.subplots(height, width, squeeze=False, subplot_kw=_BARE)
     # Little space between the pictures, room for labels at the left and times on top.
     wide, high = figure.get_size_inches()
     figure.subplots_adjust(0.38 / wide, 0.02 / high, 1 - 0.02 / wide, 1 - 0.28 / high, 0.02, 0.02)
@@ -133,7 +135,7 @@ def contact_sheet(
     height = len(layers) * -(-len(frames) // width)
     inches = (CELL + HEADING) * height + LEGEND
     figure = Figure((CELL * width, inches), dpi=PIXELS / CELL)
-    grid = figure.subplots(height, width, squeeze=False)
+    grid = figure.subplots(height, width, squeeze=False, subplot_kw=_BARE)
     top = 1 - 0.75 * HEADING / inches
     figure.subplots_adjust(0, LEGEND / inches, 1, top, wspace=0.02, hspace=HEADING / CELL)
     for axes in grid.flat:
@@ -180,7 +182,7 @@ def draw_points(mesh: Mesh, vertices: IntArray) -> Figure:
 
     figure = Figure(figsize=(_POINTS_INCHES * len(TURNS), _POINTS_INCHES), dpi=_POINTS_RESOLUTION)
     size = round(_POINTS_INCHES * _POINTS_RESOLUTION)
-    grid = figure.subplots(1, len(TURNS))
+    grid = figure.subplots(1, len(TURNS), subplot_kw=_BARE)
     figure.subplots_adjust(0, 0, 1, 1, wspace=0)
     for axes, turn in zip(grid, TURNS, strict=True):
         camera = frame_mesh(mesh.vertices, turn)

@@ -70,3 +70,13 @@ def test_a_missing_file_is_bad_input(facert, tmp_path):
     failed = facert("inspect", tmp_path / "none.h5")
     assert failed.code == 3
     assert "found nothing" in failed.err
+
+
+def test_of_very_many_names_some_are_shown_and_all_are_in_json(facert, tmp_path):
+    path, names = tmp_path / "many.csv", [f"w{i}" for i in range(600)]
+    path.write_text(",".join(["time", *names]) + f"\n0{',1' * 600}\n1{',2' * 600}\n")
+    shown = " ".join(facert("inspect", path).out.split())
+    assert "(600) w0, w1," in shown
+    assert "and 100 more: --json lists all" in shown
+    assert "w599" not in shown
+    assert json.loads(facert("inspect", path, "--json").out)["source"]["names"] == names

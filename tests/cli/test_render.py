@@ -106,3 +106,12 @@ def test_nothing_is_written_over(facert, folder: Path) -> None:
     (folder / "clip.gif").write_text("mine")
     assert facert("render", folder / "face.h5", folder / "clip.gif").code == 2
     assert (folder / "clip.gif").read_text() == "mine"
+
+
+def test_a_mesh_without_extent_is_refused_before_its_frames_are_read(facert, folder: Path) -> None:
+    with h5py.File(folder / "face.h5", "r+") as file:
+        file["neutral"][:] = 1.0
+        file["vertices"][:] = np.nan
+    outcome = facert("render", folder / "face.h5", folder / "sheet.png")
+    assert outcome.code == 3
+    assert "/neutral: expected vertices apart from each other" in outcome.err

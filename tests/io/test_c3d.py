@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from contextlib import suppress
 from pathlib import Path
 
@@ -125,3 +126,12 @@ def test_damaged_bytes_give_a_take_or_one_error(tmp_path_factory, changes) -> No
     path.write_bytes(content)
     with suppress(InputError):
         assert read_c3d(path).source.values.ndim == 3
+
+
+def test_frames_are_counted_before_they_take_memory(tmp_path: Path) -> None:
+    """A header of a few bytes may declare more than any machine could hold."""
+    path, most = tmp_path / "large.c3d", 65535
+    head = struct.pack("<BBHHHHHfHHf", 2, 80, most, 0, 1, most, 0, -1.0, 3, 0, 25.0)
+    path.write_bytes(head.ljust(512, b"\0") + bytes([0, 0, 1, 84]).ljust(512, b"\0"))
+    with pytest.raises(InputError, match="frames: expected at most 64 MiB"):
+        read_c3d(path)

@@ -78,3 +78,21 @@ def test_names_in_an_old_encoding_are_no_harm(tmp_path):
     path = tmp_path / "mesh.obj"
     path.write_bytes(f"o M\xfcller\n{SQUARE}f 1 2 3\n".encode("latin-1"))
     assert len(read_obj(path).vertices) == 4
+
+
+def test_vertices_of_any_length_and_blanks_are_read(tmp_path):
+    path = tmp_path / "mesh.obj"
+    path.write_text("  v 0 0 0 1 .5 .5\nv\t1  0 0\nv 1e0 1 0 1\nvn 0 0 1\nv 0 1 0\nf 1 2 3 4\n")
+    plain = tmp_path / "plain.obj"
+    plain.write_text(f"{SQUARE}f 1 2 3 4\n")
+    assert np.array_equal(read_obj(path).vertices, read_obj(plain).vertices)
+    assert read_obj(path).faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+def test_the_files_of_a_folder_share_one_account_of_memory(tmp_path, monkeypatch):
+    monkeypatch.setenv("FACERT_MAX_MEMORY", "1M")
+    for name in ("neutral", *(f"s{i}" for i in range(8))):
+        (tmp_path / f"{name}.obj").write_text("v 0 0 1\n" * 2000 + "f 1 2 3\n")
+    assert len(read_obj(tmp_path / "neutral.obj").vertices) == 2000
+    with pytest.raises(InputError, match=r"s\d.obj: vertices: expected at most 1 MiB"):
+        read_obj_folder(tmp_path)

@@ -299,3 +299,14 @@ def test_frames_without_a_face_are_counted_and_no_list_is_said_to_be_left_out(pa
     assert np.flatnonzero(np.isnan(take.source.values[:, 0])).tolist() == [7, 8]
     assert "2 frames without a face" in caplog.text
     assert "left out" not in caplog.text
+
+
+def test_a_frame_of_very_many_names_is_refused_before_it_is_parsed(tmp_path):
+    names = ", ".join(f'"w{i}": 0' for i in range(60_000))
+    path = tmp_path / "wide.json"
+    path.write_text(f"[{{{names}}}, nobody reads on")
+    with pytest.raises(InputError, match="at most 49216 columns, found 60000"):
+        read_take_file(path)
+    curve = ", ".join(f'"{i / 30:.6f}": 0.5' for i in range(60_000))
+    path.write_text(f'[{{"Name": "jawOpen", {curve}}}]')
+    assert len(read_take_file(path)) == 60_000

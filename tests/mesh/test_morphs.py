@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -90,3 +92,22 @@ def test_a_rig_without_a_pose_is_refused() -> None:
     rig = Rig(MESH.vertices, RNG.normal(size=(1, 40, 3)), ("a",), MESH.faces)
     with pytest.raises(InputError, match="/target/params"):
         rig_morphs(rig, np.full((2, 1), np.nan), np.arange(2.0))
+
+
+def test_many_frames_of_a_small_mesh_are_fetched_at_once() -> None:
+    """Of a triangle there are nine directions, in however many frames."""
+    frames, asked = 100_000, []
+    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]]))
+    moved = mesh.vertices * np.linspace(1, 2, frames)[:, None, None]
+
+    def fetch(rows: np.ndarray) -> np.ndarray:
+        asked.append(len(rows))
+        return moved[rows]
+
+    tracemalloc.start()
+    morphs = compact_morphs(MeshSequence(mesh, np.arange(frames) / 30, fetch))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(morphs.targets) == 1
+    assert len(asked) < 20
+    assert peak < 6 * moved.nbytes

@@ -250,3 +250,10 @@ def test_triangles_far_beyond_a_picture_are_drawn_within_it(size):
     surface = rasterise(pixels, SQUARE, np.ones((4, 3)), FRONT, 16)
     assert np.isfinite(surface.depth).all()
     assert surface.covered.shape == (16, 16)
+
+
+def test_axes_that_are_not_shown_make_no_ticks() -> None:
+    sheet = render_sheet([FACE], [0, 1], TAKE, 64)
+    assert not any(
+        axis.get_major_ticks() for axes in sheet.axes for axis in (axes.xaxis, axes.yaxis)
+    )

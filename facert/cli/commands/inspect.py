@@ -13,6 +13,8 @@ from facert.data.text import for_json, plural
 if TYPE_CHECKING:
     from rich.table import Table
 
+MOST = 500
+"""Names in a list that are shown: nobody reads more, and a table of very many takes seconds."""
 _LABELS = {"deviations": "standard deviations"}
 
 
@@ -112,7 +114,8 @@ def _text(value: Any) -> str:
         return f"{value:.4g}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         count = f"({len(value)}) " if value and isinstance(value[0], str) else ""
-        return count + ", ".join(map(_part, value))
+        more = f", and {len(value) - MOST} more: --json lists all" if len(value) > MOST else ""
+        return count + ", ".join(map(_part, value[:MOST])) + more
     return str(value)
 
 

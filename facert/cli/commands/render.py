@@ -80,6 +80,7 @@ def command(
     """
     from facert.errors import reading
     from facert.io.formats import targets_for
+    from facert.render.faces import require_extents, require_same_length
 
     require_inputs(path, rig_path, drivers_path, truth_path)
     require_inputs(actor_file(actor_path), video_path, *(beside or []))
@@ -94,6 +95,8 @@ def command(
         faces, take = _own_faces(stack, path, rig, ours, (actor_path, shapes))
         beside_it = zip(others, theirs, strict=True)
         faces += [_open_face(stack, one, rig, t, label)[0] for (one, label), t in beside_it]
+        require_same_length(faces)
+        require_extents(faces)
         footage = open_footage(video_path, faces[0].motion, video_start, size)
         video = None if footage is None else footage.at
         if output.suffix.lower() not in CLIP_RATES:

@@ -15,7 +15,7 @@ from typing import Any
 
 from facert.data.column_names import Role, role_of_name
 from facert.errors import InputError
-from facert.io.lines import require_few
+from facert.io.lines import MAX_COLUMNS, require_few
 
 log = logging.getLogger("facert")
 
@@ -53,6 +53,7 @@ def parsed(text: str) -> Any:
 
     Raises `InputError` for any other text.
     """
+    _require_few_names(text)
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -67,6 +68,17 @@ def parsed(text: str) -> Any:
     except (ValueError, RecursionError) as error:
         expected = "JSON, whole or in each line"
         raise InputError("lines", expected, str(error), "Export it again.") from None
+
+
+def _require_few_names(text: str) -> None:
+    """Refuse a frame with very many names before it is parsed: the first object is looked at.
+
+    One whose keys are times or numbers of frames may be a long curve.
+    """
+    first = text[: text.find("}") + 1]
+    *named, _ = first[first.rfind("{") + 1 :].split('":', MAX_COLUMNS + 1)
+    if len(named) > MAX_COLUMNS and not _is_numeral(named[-1].rpartition('"')[2]):
+        require_few(first.count('":'))
 
 
 def _too_many(frames: int) -> InputError:
