@@ -30,13 +30,15 @@ from typing import Annotated, Self
 import numpy as np
 from scipy.optimize import nnls
 
-from facert.data.arrays import FloatArray, rms
+from facert.data.arrays import FloatArray, IntArray, rms
 from facert.methods.base import Labelled, TrainingReport, Unlabelled, stacked
 from facert.methods.factors import FactorMap
 from facert.methods.folds import ranked_folds
+from facert.methods.held_out import held_out
 from facert.methods.processes import Basis, FeatureProcess, ProcessBank
 from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
+from facert.models.gp.hyperparameters import MOST_SEARCHED
 
 TOGETHER = 0.3  # ρ
 FAULTLESS = 1e-9  # least E, relative to the squared error of the worst expert
@@ -146,18 +148,50 @@ class BaseMaps:
         return np.array([map_(X)[0] for map_ in (self.plain, self.whitened, self.factors)])
 
 
-def cross_validated_poses(labelled: Labelled, unlabelled: Unlabelled) -> FloatArray:
+def cross_validated_poses(labelled: Labelled, unlabelled: Unlabelled, maps: BaseMaps) -> FloatArray:
     """Poses that each of the base maps predicts for labels that it was not given, (3, l, d_y).
 
     The factors have no closed form of it: they are learned five times more, each time without the
-    poses of a fifth of the labels, and the processes with them.
+    poses of a fifth of the labels, and the processes with them. Of so many labels that a part of
+    them determines a kernel the processes keep theirs, see `facert.methods.held_out`.
     """
     predicted = np.empty((3, *labelled.Y.shape))
-    for train, test in ranked_folds(labelled.X):
-        rest = Labelled(labelled.X[train], labelled.Y[train])
-        frames = np.vstack([unlabelled.X, labelled.X[test]])
-        maps = BaseMaps.learn(rest, Unlabelled(frames, unlabelled.Y))
-        predicted[:, test] = maps(labelled.X[test])
+    folds = ranked_folds(labelled.X)
+    if len(labelled.X) > MOST_SEARCHED:
+        return _with_their_kernels(labelled, unlabelled, maps, folds)
+    for train, test in folds:
+        rest, others = _without(labelled, unlabelled, train, test)
+        predicted[:, test] = BaseMaps.learn(rest, others)(labelled.X[test])
+    return predicted
+
+
+def _without(
+    labelled: Labelled, unlabelled: Unlabelled, train: IntArray, test: IntArray
+) -> tuple[Labelled, Unlabelled]:
+    """The data without the poses of the labels to test on."""
+    frames = np.vstack([unlabelled.X, labelled.X[test]])
+    rest = Labelled(labelled.X[train], labelled.Y[train])
+    return rest, Unlabelled(frames, unlabelled.Y)
+
+
+def _with_their_kernels(
+    labelled: Labelled,
+    unlabelled: Unlabelled,
+    maps: BaseMaps,
+    folds: Sequence[tuple[IntArray, IntArray]],
+) -> FloatArray:
+    """`cross_validated_poses` by processes whose kernels and features are those of all labels."""
+    predicted = np.empty((3, *labelled.Y.shape))
+    X, count = np.vstack([unlabelled.X, labelled.X]), len(unlabelled.X)
+    data = [_without(labelled, unlabelled, train, test) for train, test in folds]
+    means = np.stack([stacked(rest, others)[1].mean(axis=0) for rest, others in data])
+    tests = [test for _, test in folds]
+    plain, whitened = (held_out(p, tests, means)(X) for p in (maps.plain, maps.whitened))
+    for (rest, others), test, one, other in zip(data, tests, plain, whitened, strict=True):
+        at = count + test
+        guess = np.concatenate([one[:count] + other[:count], one[at] + other[at]]) / 2.0
+        factors = FactorMap.learn(rest, others, guess)
+        predicted[:, test] = [one[at], other[at], factors(labelled.X[test])[0]]
     return predicted
 
 
@@ -179,7 +213,7 @@ class Auto(Regression):
         bounds = _bounds(unlabelled, poses)
         some = _fewer_poses(unlabelled, self.settings.seed)
         maps = BaseMaps.learn(labelled, some)
-        plain, whitened, factors = np.clip(cross_validated_poses(labelled, some), *bounds)
+        plain, whitened, factors = np.clip(cross_validated_poses(labelled, some, maps), *bounds)
 
         Y, basis = labelled.Y, Basis(maps.whitened.centre, maps.whitened.basis)
         left = Labelled(labelled.X, Y - factors)

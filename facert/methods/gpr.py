@@ -24,7 +24,8 @@ class GPR(SupervisedRegression):
         found = maximise_likelihood(X, Y, self.linear_bounds)
         theta = np.array([*found.kernel.theta, found.kernel.linear])
         figures = {f"theta{index}": float(value) for index, value in enumerate(theta, start=1)}
-        return ProcessMap(X, Y, theta), {"log likelihood": found.value, **figures}
+        searched = "" if found.rows == len(X) else f" of {found.rows} labels"
+        return ProcessMap(X, Y, theta), {f"log likelihood{searched}": found.value, **figures}
 
 
 class LinearGPR(GPR):

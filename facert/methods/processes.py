@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
+from scipy.linalg.lapack import dpotrs
 
 from facert.data.array_group import DAMAGED
 from facert.data.arrays import FloatArray
@@ -16,14 +17,14 @@ from facert.errors import InputError
 from facert.methods.base import Labelled
 from facert.methods.regression import Map, Variance
 from facert.models.gp.hyperparameters import maximise_likelihood
-from facert.models.gp.jitter import whitener
+from facert.models.gp.jitter import inverted, lower_factor
 from facert.models.kernels import RegressionKernel, squared_exponential
 from facert.models.loo import leave_one_out_errors
+from facert.models.threads import SMALL
 from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening
-# The search for the kernel takes time with the cube of the labels, and a few determine it as well.
-MOST_SEARCHED = 200
+MOST_KERNELS = 2**23  # numbers of kernels between frames and labels that are held at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +55,24 @@ class ProcessMap(Map):
     @cached_property
     def whitening(self) -> FloatArray:
         """L⁻ᵀ, where L Lᵀ = K, (n, n)."""
-        n = len(self.X)
-        require_memory(4 * FLOAT * n**2, f"a kernel of {n} poses", "Train on fewer.")
-        return np.ascontiguousarray(whitener(self.kernel.gram(self.X)).T)
+        L = self._factor
+        del vars(self)["_factor"]  # two such matrices are enough
+        return np.ascontiguousarray(np.tril(inverted(L)).T)
 
     @cached_property
     def alpha(self) -> FloatArray:
         """K⁻¹ Y, (n, d_y)."""
-        return np.asarray(self.whitening @ (self.whitening.T @ self.Y))
+        if len(self.X) <= SMALL:
+            return np.asarray(self.whitening @ (self.whitening.T @ self.Y))
+        # An inverse of many takes seconds, which only the variance is worth.
+        return np.asarray(dpotrs(self._factor, self.Y, lower=1)[0])
+
+    @cached_property
+    def _factor(self) -> FloatArray:
+        """L, (n, n); its upper triangle means nothing."""
+        n = len(self.X)
+        require_memory(4 * FLOAT * n**2, f"a kernel of {n} poses", "Train on fewer.")
+        return lower_factor(self.kernel.gram(self.X))
 
     @property
     def leave_one_out_errors(self) -> FloatArray:
@@ -88,8 +99,7 @@ class FeatureProcess(Map):
     def learn(cls, labelled: Labelled, basis: Basis, mean: FloatArray) -> FeatureProcess:
         """The process of maximum likelihood given labelled frames."""
         features, targets = basis.features(labelled.X), labelled.Y - mean
-        step = -(-len(features) // MOST_SEARCHED)
-        kernel = maximise_likelihood(features[::step], targets[::step]).kernel
+        kernel = maximise_likelihood(features, targets).kernel
         theta = np.array([*kernel.theta, kernel.linear])
         return cls(basis.centre, basis.matrix, mean, ProcessMap(features, targets, theta))
 
@@ -129,7 +139,7 @@ class ProcessBank:
     """Processes on the same n labels, evaluated together.
 
     Processes on the same features share products and distances, and all poses are one product with
-    their α. So a single frame takes few operations, and a batch little memory.
+    their α. So a single frame takes few operations; many are taken in parts, for little memory.
 
     Parameters
     ----------
@@ -145,10 +155,19 @@ class ProcessBank:
         self._noise, self._half_theta4 = 1.0 / theta3[:, 0], 0.5 * theta4
         self._alpha = np.stack([process.process.alpha for process in processes])
         self._means = np.stack([process.mean for process in processes])[:, None]
-        self._whitening = np.stack([process.process.whitening for process in processes])
+        self._maps = [process.process for process in processes]
+        self._rows = max(1, MOST_KERNELS // (len(processes) * self._norms.shape[2]))
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
         """Poses of frames X (T, d_x), (p, T, d_y), and their variances, noise included, (p, T)."""
+        if len(X) <= self._rows:
+            return self._at_once(X)
+        parts = [X[first : first + self._rows] for first in range(0, len(X), self._rows)]
+        poses = np.concatenate([self._at_once(part)[0] for part in parts], axis=1)
+        # Keeping the kernels until somebody asks would take what the parts are there to save.
+        return poses, lambda: np.concatenate([self._at_once(part)[1]() for part in parts], axis=1)
+
+    def _at_once(self, X: FloatArray) -> tuple[FloatArray, Variance]:
         products = np.empty((len(self._features), len(X), self._norms.shape[2]))  # 2 φᵀφ_i
         squares = np.empty((len(self._features), len(X), 1))  # |φ|²
         for row, features in enumerate(self._features):
@@ -167,8 +186,8 @@ class ProcessBank:
 
     def _variances(self, k: FloatArray, squares: FloatArray) -> FloatArray:
         """Variances (p, T), from the kernels (p, T, n) and |φ|² of every feature (f, T, 1)."""
-        whitened = np.matmul(k, self._whitening)
-        explained = np.vecdot(whitened, whitened)
+        whitened = [np.matmul(one, map_.whitening) for one, map_ in zip(k, self._maps, strict=True)]
+        explained = np.stack([np.vecdot(one, one) for one in whitened])
         prior = self._theta1 + 2.0 * self._half_theta4 * squares[self._of]
         # Rounding can take the difference below the noise, which is its least value.
         return np.asarray(self._noise + np.maximum(prior[:, :, 0] - explained, 0.0))

@@ -31,7 +31,7 @@ from scipy.linalg import cho_solve, cholesky
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, IntArray
 from facert.models.kernels import RegressionKernel, squared_exponential
 
 # Of (log w, log ν, log λ). The widest kernel is as good as linear, the narrowest as good as noise.
@@ -40,6 +40,8 @@ NOISE_BOUNDS = (math.log(1e-11), math.log(1e4))
 LINEAR_BOUNDS = (math.log(1e-6), math.log(1e6))
 NO_LINEAR_TERM = (-1e3, -1e3)  # e to this power is 0 exactly
 LEAST_SCALE = 1e-20  # in case Y is zero throughout
+# The search takes time with the cube of the rows, and a few determine the kernel as well.
+MOST_SEARCHED = 200
 # Every combination is a start of the search.
 STARTS = ((math.log(0.03), math.log(0.3), math.log(3.0)), (math.log(1e-5), math.log(1e-2)), (0.0,))
 
@@ -49,13 +51,17 @@ class MaximumLikelihood:
     """The best kernel that was found."""
 
     kernel: RegressionKernel  # In the units of the data
-    value: float  # Its log marginal likelihood
+    value: float  # Its log marginal likelihood, of the rows that were searched
+    rows: int  # How many these were
 
 
 def maximise_likelihood(
     X: FloatArray, Y: FloatArray, linear_bounds: tuple[float, float] = LINEAR_BOUNDS
 ) -> MaximumLikelihood:
     """The kernel under which Y is most probable, the best of several starts.
+
+    Of more than `MOST_SEARCHED` rows so many are searched, spread evenly: neighbours in time are
+    alike.
 
     Parameters
     ----------
@@ -66,14 +72,22 @@ def maximise_likelihood(
     linear_bounds : tuple of float
         Bounds of log λ; `NO_LINEAR_TERM` leaves the squared exponential alone.
     """
-    profile = _Profile(X, Y)
+    rows = evenly_spread(len(X), MOST_SEARCHED)
+    profile = _Profile(X[rows], Y[rows])
     bounds = (WIDTH_BOUNDS, NOISE_BOUNDS, linear_bounds)
     searches = [
         minimize(profile, np.clip(start, *np.transpose(bounds)), jac=True, bounds=bounds)
         for start in product(*STARTS)
     ]
     best = min(searches, key=lambda search: float(search.fun))
-    return MaximumLikelihood(profile.kernel(best.x), -float(best.fun))
+    return MaximumLikelihood(profile.kernel(best.x), -float(best.fun), len(rows))
+
+
+def evenly_spread(count: int, most: int) -> IntArray:
+    """Rows of so many, all of them or at most so many at even distances."""
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).round().astype(np.int64)
 
 
 class _Profile:
