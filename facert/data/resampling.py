@@ -15,6 +15,7 @@ import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.corrections import at_frames, put_in, taken_out
+from facert.data.memory import FLOAT, require_memory
 from facert.data.rate import AGREES, frames_at, frames_shown, rate_shown, standard_rate
 from facert.data.take import Source, Take
 from facert.data.text import listed, plural
@@ -32,6 +33,7 @@ MAX_FRAMES = 2**22
 EVEN = 0.1
 """Frames lie evenly when each is off by so much of a frame at most, besides rounding."""
 
+_COPIES = 3  # of the largest part of a take, as it is interpolated
 _SAME = 1e-6  # seconds: closer than this, a new frame is the old one
 _SLACK = 1e-4  # of a frame, by which the last one may lie beyond the recording
 _AT_PAUSE = 0.25  # of a frame: beside a pause, a new frame is an old one as near as this
@@ -142,8 +144,8 @@ def _placed(take: Take, places: IntArray, fps: float) -> Take:
     """
     if len(take) == places[-1] + 1:
         return replace(take, fps=fps)
-    _check_count(places[-1] + 1)
     count = int(places[-1]) + 1
+    _check_count(count, take)
 
     def spread(rows: FloatArray | None) -> FloatArray | None:
         if rows is None:
@@ -171,7 +173,7 @@ def _new_times(take: Take, fps: float) -> FloatArray:
     """Times of the new frames, (n,)."""
     first, last = take.time[0], take.time[-1]
     count = np.floor((last - first) * fps + _SLACK) + 1
-    _check_count(count)
+    _check_count(count, take)
     return np.asarray(np.minimum(first + np.arange(int(count)) / fps, last))
 
 
@@ -184,9 +186,19 @@ def _check_pauses(time: FloatArray) -> None:
         raise InputError("/time", f"pauses of at most {LONGEST:g} s", found, fix)
 
 
-def _check_count(count: float) -> None:
+def _check_count(count: float, take: Take) -> None:
+    """Check how many frames there will be, and what they will take, before any is made."""
+    fix = "Lower the rate."
     if count > MAX_FRAMES:
-        raise InputError("--fps", f"at most {MAX_FRAMES} frames", f"{count:g}", "Lower the rate.")
+        raise InputError("--fps", f"at most {MAX_FRAMES} frames", f"{count:g}", fix)
+    widths = [0 if part is None else part[0].size for part in _parts(take)]
+    size = FLOAT * int(count) * (sum(widths) + _COPIES * max(widths))
+    require_memory(size, f"--fps ({count:g} frames)", fix)
+
+
+def _parts(take: Take) -> tuple[FloatArray | None, ...]:
+    """All that a take has of each frame."""
+    return take.source.values, take.source.std, take.params, take.std
 
 
 def nearest_frames(time: FloatArray, wanted: FloatArray) -> IntArray:

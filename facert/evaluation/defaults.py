@@ -18,6 +18,8 @@ MANY = 250
 """With so many posed frames the numbers need no note: they are those of the help."""
 LABELS = (10, 20, 30, 40)
 UNLABELLED = 100
+MOST_CELLS = 2**18
+"""Trainings that an evaluation may be: days of them, and each is kept in memory."""
 LEAST_TESTED = 10
 """Frames that are tested at least where all of `LABELS` are tried."""
 
@@ -34,7 +36,7 @@ def chosen_grid(
     Raises
     ------
     InputError
-        When too few frames are posed.
+        When too few frames are posed, or more than `MOST_CELLS` are asked for.
     """
     frames = unlabelled or (default_unlabelled(problem),)
     counts = labels or default_labels(problem, max(frames))
@@ -44,7 +46,11 @@ def chosen_grid(
         numbers = " or ".join(map(str, counts))
         text = "learns from %s of %d posed frames and %s, tests on the rest"
         log.info(text, numbers, posed, others)
-    return Grid(methods, counts, frames, repeats)
+    grid = Grid(methods, counts, frames, repeats)
+    if len(grid) > MOST_CELLS:
+        expected, fix = f"at most {MOST_CELLS} trainings in all", "Ask for fewer."
+        raise InputError("--labels, --repeats", expected, f"{len(grid)}", fix)
+    return grid
 
 
 def default_unlabelled(problem: Problem) -> int:

@@ -34,6 +34,10 @@ class Grid:
     unlabelled: tuple[int, ...]
     repeats: int  # Draws of each
 
+    def __len__(self) -> int:
+        """Number of cells."""
+        return self.repeats * len(self.labels) * len(self.unlabelled) * len(self.methods)
+
     @property
     def cells(self) -> list[Cell]:
         """All cells in order of repeats, so that a part is a fair picture of the whole."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from facert.data.drivers import Drivers
+from facert.data.memory import require_memory
 from facert.data.rate import standard_rate
 from facert.data.resampling import counted_at, evenly_spaced, held
 from facert.data.rig import Mesh, Rig, require_extent
@@ -29,6 +30,9 @@ from facert.io.registry import (
 )
 
 log = logging.getLogger("facert")
+
+_TEXT = 64
+"""Bytes of a number in a text, which is joined, cut and coded before it is written."""
 
 TakeOrRig = Literal["take", "rig"]
 
@@ -239,8 +243,17 @@ def write_take_file(take: Take, path: Path, overwrite: bool = False) -> int:
     with reading(path):
         take = evenly_spaced(take) if missing else take
         take = held(take) if missing == "held" else take
+    if path.suffix.lower() not in OWN_ENDINGS:
+        _require_room(take)
     write("take", take, path, overwrite)
     return len(take)
+
+
+def _require_room(take: Take) -> None:
+    """Refuse to make a text, as others formats are, that memory could not hold."""
+    poses = 0 if take.controls is None else len(take.controls.names)
+    cells = len(take) * (poses or take.source.values[0].size)
+    require_memory(_TEXT * cells, "output", "Write .h5, or fewer frames.")
 
 
 def _warn_of_loss(take: Take, path: Path) -> None:

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from facert.data.arrays import FloatArray, IntArray
 from facert.data.moments import frame_label
+from facert.errors import InputError
 from facert.render.faces import (
     INK,
     Face,
@@ -24,6 +25,8 @@ from facert.render.shade import Camera
 
 PIXELS = 300
 CAPTION = 28
+MOST_FRAMES = 2**20
+"""Nine hours, which nobody looks at; a clock that was set anew makes a pause of years."""
 _AT_ONCE = 8  # frames that are drawn in parallel
 
 
@@ -38,8 +41,17 @@ def sampled_frames(time: FloatArray, part: range, fps: float) -> IntArray:
         The frames from which the clip is cut.
     fps : float
         Frames a second of the clip.
+
+    Raises
+    ------
+    InputError
+        When there would be more than `MOST_FRAMES`.
     """
     seconds = time[part.start : part.stop]
+    count = (seconds[-1] - seconds[0]) * fps
+    if count > MOST_FRAMES:
+        found, fix = f"{count:.3g}", "Give a part of the take by --frames, or a lower --fps."
+        raise InputError("clip", f"at most {MOST_FRAMES} frames", found, fix)
     moments = np.arange(seconds[0], seconds[-1] + 0.5 / fps, 1 / fps)
     return part.start + np.searchsorted((seconds[1:] + seconds[:-1]) / 2, moments)
 

@@ -195,3 +195,14 @@ def test_results_may_be_made_anew_from_results(facert, folder, tmp_path) -> None
         for options in ((), ("--overwrite",)):
             done = facert(command, folder / "result.h5", out, *more, *options)
             assert done.code == 0, done.err
+
+
+def test_a_curve_that_may_not_be_written_is_refused_before_takes_are_read(
+    facert, tmp_path: Path
+) -> None:
+    (take := tmp_path / "take.csv").write_text("time,a\nbroken")
+    (curve := tmp_path / "curve.txt").write_text("somebody's")
+    arguments = ("--method", "sgplvm", "-o", tmp_path / "model.safetensors", "--log", curve)
+    refused = facert("train", take, *arguments, "--overwrite")
+    assert refused.code == 3
+    assert "curve.txt: the file was not written by facert" in refused.err

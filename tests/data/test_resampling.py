@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -244,3 +245,14 @@ def test_a_pause_of_hours_is_not_played() -> None:
     with pytest.raises(InputError, match="s without frames after frame 29"):
         evenly_spaced(make(time, 30.0))
     assert len(evenly_spaced(make(np.append(time[:30], time[30:] - 3540), 30.0))) == 60 * 31
+
+
+def test_what_would_not_fit_is_refused_before_a_frame_is_made() -> None:
+    """A file of a few rows and a rate that counts as few frames can be asked for gibibytes."""
+    values = np.zeros((3, 4_000))
+    wide = Take(np.arange(3) / 30, Source(values, [f"w{i}" for i in range(4_000)]), fps=30.0)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"--fps \(66667 frames\): expected at most .* of memory"):
+        resampled(wide, 1e6)
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()

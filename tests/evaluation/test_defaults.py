@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from facert.errors import InputError
 from facert.evaluation.cells import Cell, evaluate
-from facert.evaluation.defaults import LABELS, UNLABELLED, default_labels, default_unlabelled
+from facert.evaluation.defaults import (
+    LABELS,
+    UNLABELLED,
+    chosen_grid,
+    default_labels,
+    default_unlabelled,
+)
 from facert.evaluation.protocol import Protocol, draw, make_problem, training_take
 from facert.settings import Settings
 
@@ -80,3 +86,12 @@ def test_too_few_posed_frames_are_refused_with_what_to_do(make, make_take) -> No
     problem = make(make_take(frames=50, posed=3, animation=0))
     with pytest.raises(InputError, match=r"4 posed frames .* found 3, .* facert suggest"):
         default_labels(problem, 40)
+
+
+def test_more_trainings_than_anyone_waits_for_are_refused_before_they_are_listed(
+    make, make_take
+) -> None:
+    problem = make(make_take(frames=60, posed=60, animation=0))
+    with pytest.raises(InputError, match="at most 262144 trainings in all, found 3000000000"):
+        chosen_grid(problem, ("ridge",), (5, 6, 7), (5,), 10**9)
+    assert len(chosen_grid(problem, ("ridge",), (5, 6, 7), (5,), 4)) == 12

@@ -116,3 +116,12 @@ def test_checkpoints_come_back(folder, x, curve, fingerprint):
     assert found.curve == progress.curve
     assert replace(found.state, x=0, memory={}) == replace(progress.state, x=0, memory={})
     np.testing.assert_array_equal(found.state.x, x)
+
+
+def test_a_text_that_would_not_fit_is_refused_before_it_is_made(tmp_path, monkeypatch) -> None:
+    take = Take(np.arange(4000) / 30, Source(np.zeros((4000, 100)), [f"w{i}" for i in range(100)]))
+    monkeypatch.setenv("FACERT_MAX_MEMORY", "10M")
+    with pytest.raises(InputError, match="output: expected at most 10 MiB of memory"):
+        write_take_file(take, tmp_path / "take.csv")
+    assert not list(tmp_path.iterdir())
+    write_take_file(take, tmp_path / "take.h5")

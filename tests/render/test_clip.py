@@ -133,3 +133,11 @@ def test_the_spans_of_the_rasteriser_are_the_pixels_of_the_triangles(
         expected = np.where(inside, np.maximum(expected, depth), expected)
     np.testing.assert_array_equal(surface.covered, np.isfinite(expected))
     np.testing.assert_allclose(surface.depth, expected[surface.covered], atol=1e-6)
+
+
+def test_a_clip_of_years_is_refused() -> None:
+    """A clock that was set anew in mid take makes a pause without an end."""
+    time = np.array([0.0, 0.04, 1e9])
+    with pytest.raises(InputError, match="clip: expected at most 1048576 frames, found 3e"):
+        sampled_frames(time, range(3), 30.0)
+    assert sampled_frames(time, range(2), 30.0).tolist() == [0, 1]

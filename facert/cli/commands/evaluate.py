@@ -195,7 +195,7 @@ def _run(
 
     try:
         outcomes = run(problem, grid, settings, jobs or cores(), journal, console.like_here())
-        done = list(watched(outcomes, len(grid.cells), "cells"))
+        done = list(watched(outcomes, len(grid), "cells"))
     except KeyboardInterrupt as stop:
         if journal is not None:
             stop.add_note(f"the same command continues from {journal.path}")

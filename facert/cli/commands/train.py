@@ -169,11 +169,11 @@ def command(
     continues = checkpoint is not None and checkpoint.continues
     overwrite_model = overwrite or continues
     require_replaceable(output, overwrite_model)
-    takes = read_takes(paths, target, animation, predicted)
-    _check_regions(regions, settings.regions, takes.parts[0])
     monitors: list[Monitor] = [] if checkpoint is None else [checkpoint]
     if curve is not None and stepwise:
         monitors.append(CurveLog(curve, overwrite, continues))
+    takes = read_takes(paths, target, animation, predicted)
+    _check_regions(regions, settings.regions, takes.parts[0])
     kept = nullcontext() if stepwise else _noting_loss()
     with kept, reading(listed_files(paths)), ProgressBar() as bar:
         retargeter = facert.train(
