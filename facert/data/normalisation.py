@@ -12,10 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import FloatArray, require_size
+from facert.data.blocks import blocks
 from facert.errors import InputError
 
 # Less motion than this, relative to the largest coordinate, is rounding.
 STILL = 1e-9
+
+
+def deviation(values: FloatArray) -> FloatArray:
+    """Standard deviation of the columns of (n, d), (d,); NaN is passed over."""
+    return np.asarray(np.nanstd(values, axis=0) if np.isnan(values).any() else values.std(axis=0))
 
 
 @dataclass(frozen=True)
@@ -33,12 +39,14 @@ class Normalisation:
 
         Raises `InputError` when nothing varies, or as `facert.data.arrays.require_size` does.
         """
-        moves = bool((np.fmin.reduce(values) < np.fmax.reduce(values)).any())
+        low, high = np.fmin.reduce(values), np.fmax.reduce(values)
+        moves = bool((low < high).any())
         if moves:
             require_size(values, field)
-        mean = np.nanmean(values, axis=0)
-        scale = float(np.nanstd(values, axis=0).max()) if moves else 0.0
-        if not scale > STILL * float(np.nanmax(np.abs(values))):
+        parts = [values[:, columns] for columns in blocks(values.shape[1], len(values))]
+        mean = np.concatenate([np.nanmean(part, axis=0) for part in parts])
+        scale = max(float(deviation(part).max()) for part in parts) if moves else 0.0
+        if not scale > STILL * max(float(np.nanmax(high)), -float(np.nanmin(low))):
             expected, found = "values that change over the rows", "the same row throughout"
             raise InputError(field, expected, found, "Check that the right data was exported.")
         return cls(mean, scale)
@@ -49,8 +57,12 @@ class Normalisation:
 
     def apply(self, values: FloatArray) -> FloatArray:
         """Values (n, d) in normalised units."""
-        return (values - self.mean) / self.scale
+        normalised = values - self.mean
+        normalised /= self.scale
+        return normalised
 
     def undo(self, values: FloatArray) -> FloatArray:
         """Values (n, d) back in the data's units."""
-        return values * self.scale + self.mean
+        result = values * self.scale
+        result += self.mean
+        return result

@@ -33,7 +33,7 @@ def keep_last(function: Callable[Given, Result]) -> Callable[Given, Result]:
     def wrapper(*args: Given.args, **kwargs: Given.kwargs) -> Result:
         from joblib import hash as digest_of  # takes its time to import
 
-        digest = str(digest_of((args, kwargs)))
+        digest = str(digest_of((args, kwargs), hash_name="sha1"))
         with guard:
             known = kept.pop(digest, None)
         found = known or (function(*args, **kwargs), sum(map(_size, args)))

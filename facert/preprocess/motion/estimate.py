@@ -9,13 +9,16 @@ seen, and a motion learned without these is compared with what was seen.
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray, frozen
-from facert.data.normalisation import STILL, Normalisation
+from facert.data.blocks import blocks
+from facert.data.blocks import spread as evenly_spread
+from facert.data.normalisation import STILL, Normalisation, deviation
 from facert.models.threads import threads_for
 from facert.preprocess.cache import keep_last
 from facert.preprocess.motion.motion import Motion
@@ -33,6 +36,8 @@ LEAST_NOISE = 1e-4
 LEAST_COMPARED, WINDOW = 100, 1000
 """Numbers that are compared to calibrate the standard deviation of hidden entries, at least, and
 frames that they are taken from, at most."""
+COLUMNS = 1200
+"""Of more columns, so many are looked at."""
 RANGE = (1.0, 10.0)
 """Of the calibration: a take that happens to have been easy half a take later proves nothing."""
 
@@ -65,7 +70,8 @@ class MotionEstimate:
         noise = max(self.sigma / self.units.scale, LEAST_NOISE)
         with threads_for(1):
             ratio = error_of_filling(self.given, noise, float(self.motion.clock[0]))
-        return frozen(np.where(self.hidden, ratio * self.spread, self.spread))
+        std = self.spread.copy()
+        return frozen(np.multiply(std, ratio, out=std, where=self.hidden))
 
     def summary(self, unit: str) -> str:
         """Noise and motion, for people."""
@@ -93,23 +99,42 @@ def estimate(X: FloatArray, time: FloatArray, sigma: float | None = None) -> Mot
     """
     even, places, step = evenly(X, time)
     sigma = capture_noise(even) if sigma is None else sigma
-    ever = ~np.isnan(X).all(axis=0)
+    hidden = np.isnan(X)
+    ever = _all_or(np.asarray(~hidden.all(axis=0)))
     units = Normalisation.of(X[:, ever], "/source")
     noise = max(sigma / units.scale, LEAST_NOISE)
     given = units.apply(even[:, ever])
     with threads_for(1):
         motion = Motion.learned(given, noise, step)
-        mean, variance = motion.smooth(given, noise)
-    frames, spread = np.full(X.shape, np.nan), np.full(X.shape, np.nan)
-    frames[:, ever] = units.undo(mean[places])
-    spread[:, ever] = units.scale * np.sqrt(variance[places])
+        smooth = motion.smooth(given, noise)
+    mean, variance = smooth if len(even) == len(X) else (one[places] for one in smooth)
+    for values in (mean, np.sqrt(variance, out=variance)):
+        values *= units.scale
+    mean += units.mean
+    frames, spread = (_at_all(values, ever, X.shape) for values in (mean, variance))
     step = largest_step(frames)
-    return MotionEstimate(frames, spread, np.isnan(X), sigma, step, motion, units, given)
+    return MotionEstimate(frames, spread, hidden, sigma, step, motion, units, given)
+
+
+def _all_or(mask: BoolArray) -> slice | IntArray:
+    """The columns of a mask (d,); without a copy, where these are all."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
+
+
+def _at_all(values: FloatArray, ever: slice | IntArray, shape: tuple[int, ...]) -> FloatArray:
+    """Values of the columns that were ever seen, and NaN in the others."""
+    if isinstance(ever, slice):
+        return values
+    result = np.full(shape, np.nan)
+    result[:, ever] = values
+    return result
 
 
 def evenly(X: FloatArray, time: FloatArray) -> tuple[FloatArray, IntArray, float]:
     """Frames (T, d) on an even grid, NaN where it has none; their rows in it; its step, seconds."""
     places, step = even_grid(time)
+    if places[-1] + 1 == len(X):
+        return X, places, step
     even = np.full((places[-1] + 1, X.shape[1]), np.nan)
     even[places] = X
     return even, places, step
@@ -119,20 +144,37 @@ def estimate_if_it_moves(
     X: FloatArray, time: FloatArray, sigma: float | None = None
 ) -> MotionEstimate | None:
     """The joint estimate of a performance; None for single poses, or a face that never moves."""
-    seen = X[:, ~np.isnan(X).all(axis=0)]
-    spread = float(np.nanstd(seen, axis=0).max())
-    if len(X) < FEWEST or not spread > STILL * float(np.nanmax(np.abs(seen))):
+    if len(X) < FEWEST or not _moves(X):
         return None
-    if sigma is None and _relation(seen) > UNRELATED:
+    if sigma is None and not _follow(X):
         log.warning("the frames do not follow each other smoothly: each is taken on its own")
         return None
     return estimate(X, time, sigma)
 
 
+def _moves(X: FloatArray) -> bool:
+    """Whether a column of frames (T, d) varies by more than rounding."""
+    largest = max(float(np.fmax.reduce(X, None)), -float(np.fmin.reduce(X, None)))
+    return any((deviation(part) > STILL * largest).any() for part in _parts(X))
+
+
+def _follow(X: FloatArray) -> bool:
+    """Whether the frames of any column follow each other: others may be noise alone."""
+    return any(_relation(part) <= UNRELATED for part in _parts(X))
+
+
+def _parts(X: FloatArray) -> Iterator[FloatArray]:
+    """Frames (T, d) in blocks of their columns, without those that never were observed."""
+    for columns in blocks(X.shape[1], len(X)):
+        part = X[:, columns]
+        ever = _all_or(np.asarray(~np.isnan(part).all(axis=0)))
+        yield part[:, ever]
+
+
 def _relation(X: FloatArray) -> float:
     """Variance of the difference between neighbouring frames, relative to that of unrelated ones.
 
-    The least of all columns is taken: others may be noise alone.
+    The least of all columns is taken.
     """
     steps, variance = np.diff(X, axis=0), np.nanvar(X, axis=0)
     known = (variance > 0.0) & ~np.isnan(steps).all(axis=0)
@@ -157,6 +199,8 @@ def error_of_filling(X: FloatArray, sigma: float, seconds: float) -> float:
     float
         Within `RANGE`; 1 where the take has too few gaps.
     """
+    looked_at = _compared(np.asarray(np.isnan(X).any(axis=0)))
+    X = X[:, looked_at]
     hidden = np.isnan(X)
     again = np.roll(hidden, len(X) // 2, axis=0) & ~hidden
     again[:, (hidden | again).all(axis=0)] = False
@@ -169,6 +213,14 @@ def error_of_filling(X: FloatArray, sigma: float, seconds: float) -> float:
     square = float(np.mean((mean - X[window])[compared] ** 2)) - sigma**2
     predicted = float(np.mean(variance[compared]))
     return float(np.clip(np.sqrt(max(square, 0.0) / predicted), *RANGE))
+
+
+def _compared(gappy: BoolArray) -> slice | IntArray:
+    """Columns that a calibration of many looks at: as many with gaps (d,) as without."""
+    if len(gappy) <= COLUMNS:
+        return slice(None)
+    both = (np.flatnonzero(gappy), np.flatnonzero(~gappy))
+    return np.sort(np.concatenate([one[evenly_spread(len(one), COLUMNS // 2)] for one in both]))
 
 
 def _busiest(marked: BoolArray) -> slice:

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from facert.data.array_group import ArrayGroup
-from facert.data.arrays import FloatArray, IntArray
-from facert.preprocess.motion.motion_factors import MotionFactors
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.blocks import blocks, spread
+from facert.preprocess.motion.motion_factors import MotionFactors, part_of
 from facert.preprocess.motion.series import interpolated
 from facert.preprocess.motion.smoothing import (
     QUICKEST,
@@ -37,6 +39,8 @@ SHOWN = 0.5
 PART, OVERLAP = 5000, 500
 """Frames that are smoothed at once, and how many around them; the slowest motion is forgotten by
 then."""
+IN_MEMORY = 1 << 21
+"""Numbers of the columns that are smoothed at once."""
 LEAST_VARIANCE = 1e-6
 """Of what is peculiar to a column, normalised units."""
 
@@ -95,16 +99,18 @@ class Motion(ArrayGroup):
         No stretch that it is learned from crosses from one take to the next. The rates are for the
         frames of the first take.
         """
-        X = np.concatenate(takes)
-        seen = ~np.isnan(X)
-        some = _spread(np.flatnonzero(seen.any(axis=1)), FIT)
-        some = some if seen[some].any(axis=0).all() else np.arange(len(X))
-        filled = np.concatenate([_filled(take) for take in takes])
-        factors = MotionFactors.learned(X[some], filled[some], sigma, min(FACTORS, len(some) - 1))
+        shown = [(~np.isnan(take)).mean(axis=1) for take in takes]
+        rows = _rows(takes, shown)
+        part = part_of(takes[0].shape[1])
+        filled = _at([_filled(take[:, part]) for take in takes], rows)
+        q = min(FACTORS, len(filled) - 1)
+        factors = MotionFactors.learned(_at(takes, rows), filled, sigma, q)
         clocks = np.array(seconds) / seconds[0]
-        factors, rates, left = _paced(factors, _stretches(takes, clocks))
+        stretches = _stretches(takes, shown, clocks)
+        factors, rates = _paced(factors, stretches)
+        rest = _rest(_residuals(factors, rates, stretches), _clocks(stretches), sigma)
         own, clock = factors.with_noise(-(sigma**2), LEAST_VARIANCE), np.array([seconds[0], sigma])
-        return cls(own, rates, *_rest(left, sigma), clock)
+        return cls(own, rates, *rest, clock)
 
     def seen_with(self, sigma: float) -> MotionFactors:
         """The factors as a capture with noise of this standard deviation shows them."""
@@ -115,30 +121,72 @@ class Motion(ArrayGroup):
 
         Long takes are done in parts that overlap, so that memory stays bounded.
         """
-        parts = []
+        factors = self.seen_with(sigma)
+        mean, variance = np.empty_like(X), np.empty_like(X)
         for start in range(0, len(X), PART):
             first = max(start - OVERLAP, 0)
-            part = self._smooth(X[first : start + PART + OVERLAP], sigma)
-            parts.append([values[start - first :][:PART] for values in part])
-        mean, variance = (np.concatenate(values) for values in zip(*parts, strict=True))
+            part, kept = X[first : start + PART + OVERLAP], slice(start, start + PART)
+            inner = slice(start - first, start - first + PART)
+            found = smooth_factors(*factors.information(part), self.rates)
+            for columns in blocks(X.shape[1], len(part), IN_MEMORY):
+                own = self._smooth(part[:, columns], found, columns, sigma)
+                mean[kept, columns], variance[kept, columns] = (one[inner] for one in own)
         return mean, variance
 
-    def _smooth(self, X: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
-        seen = ~np.isnan(X)
-        factors = self.seen_with(sigma)
-        found = smooth_factors(*factors.information(X), self.rates)
+    def _smooth(
+        self, X: FloatArray, found: Smoothed, columns: slice, sigma: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance of some columns of frames (T, d) of which the factors are found."""
+        seen, factors = ~np.isnan(X), self.factors.at(columns)
         frames = factors.frames(found.mean)
-        left = np.where(seen, X - frames, np.nan)
-        rest, input_variance = smooth_series(left, seen, self.rest, sigma**2, self.rest_rates)
-        variance = factors.variance(found.covariance) + input_variance
+        variance, rate = self.rest[columns], self.rest_rates[columns]
+        rest, left = smooth_series(X - frames, seen, variance, sigma**2, rate)
+        left += factors.variance(found.covariance)
         # The layers take each other for noise: both know less of what was seen than it showed.
-        return frames + rest, np.where(seen, np.minimum(variance, sigma**2), variance)
+        return frames + rest, np.where(seen, np.minimum(left, sigma**2), left)
 
 
-def _spread(indices: IntArray, most: int) -> IntArray:
-    """At most so many of the frames, evenly spread."""
-    count = len(indices)
-    return indices[np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))]
+def _rows(takes: Sequence[FloatArray], shown: Sequence[FloatArray]) -> list[IntArray]:
+    """The frames of each take that factors are learned from: some that show anything.
+
+    All of a short take, if a column would be lost; of a long one, besides, the first that show it.
+    """
+    for most in (FIT, PART):
+        rows = _evenly([np.flatnonzero(one) for one in shown], most)
+        lost = _lost(takes, rows)
+        if not lost.any():
+            break
+    else:
+        for k, take in enumerate(takes):
+            known = ~np.isnan(take[:, lost])
+            rows[k] = np.union1d(rows[k], known.argmax(axis=0)[known.any(axis=0)])
+    return rows
+
+
+def _lost(takes: Sequence[FloatArray], rows: Sequence[IntArray]) -> BoolArray:
+    """Mask of the columns that none of these rows of the takes shows, (d,)."""
+    lost = np.ones(takes[0].shape[1], dtype=np.bool_)
+    for take, own in zip(takes, rows, strict=True):
+        for row in own:
+            if not lost.any():
+                break
+            lost &= np.isnan(take[row])
+    return lost
+
+
+def _at(takes: Sequence[FloatArray], rows: Sequence[IntArray]) -> FloatArray:
+    """These rows of each take, one take after the other."""
+    return np.concatenate([take[own] for take, own in zip(takes, rows, strict=True)])
+
+
+def _evenly(indices: Sequence[IntArray], most: int) -> list[IntArray]:
+    """At most so many of the indices of some takes, evenly spread over all."""
+    ends = np.cumsum([0, *map(len, indices)])
+    chosen = spread(int(ends[-1]), most)
+    return [
+        own[chosen[(chosen >= start) & (chosen < end)] - start]
+        for own, start, end in zip(indices, ends[:-1], ends[1:], strict=True)
+    ]
 
 
 def _filled(X: FloatArray) -> FloatArray:
@@ -150,39 +198,39 @@ def _filled(X: FloatArray) -> FloatArray:
 
 
 class _Stretches(NamedTuple):
-    """Stretches of one take, (length, n, d), and its time from frame to frame, relative."""
+    """Stretches of one take."""
 
-    frames: FloatArray
-    clock: float
+    take: FloatArray  # (T, d)
+    rows: IntArray  # (length, n)
+    clock: float  # Time from frame to frame, relative
+
+    def at(self, columns: slice | IntArray) -> FloatArray:
+        """Some columns of them, (length, n, d')."""
+        if isinstance(columns, slice):
+            return self.take[:, columns][self.rows]
+        return self.take[self.rows[:, :, None], columns]
 
 
-def _stretches(takes: Sequence[FloatArray], clocks: FloatArray) -> list[_Stretches]:
+def _stretches(
+    takes: Sequence[FloatArray], shown: Sequence[FloatArray], clocks: FloatArray
+) -> list[_Stretches]:
     """`STRETCHES` of all takes, evenly spread over those that show enough."""
     length = min(STRETCH, max(map(len, takes)))
-    parts = [
-        (take, clock) for take, clock in zip(takes, clocks, strict=True) if len(take) >= length
+    long = [k for k, take in enumerate(takes) if len(take) >= length]
+    means = [sliding_window_view(shown[k], length).mean(axis=1) for k in long]
+    enough = SHOWN * max(one.max() for one in means)
+    starts = _evenly([np.flatnonzero(one >= enough) for one in means], STRETCHES)
+    return [
+        _Stretches(takes[k], own + np.arange(length)[:, None], float(clocks[k]))
+        for k, own in zip(long, starts, strict=True)
+        if len(own)
     ]
-    shown = [
-        np.lib.stride_tricks.sliding_window_view((~np.isnan(take)).mean(axis=1), length).mean(
-            axis=1
-        )
-        for take, _ in parts
-    ]
-    ends = np.cumsum([0, *map(len, shown)])
-    of_all = np.concatenate(shown)
-    chosen = _spread(np.flatnonzero(of_all >= SHOWN * of_all.max()), STRETCHES)
-    found = []
-    for (take, clock), start, end in zip(parts, ends[:-1], ends[1:], strict=True):
-        own = chosen[(chosen >= start) & (chosen < end)] - start
-        if len(own):
-            found.append(_Stretches(take[own + np.arange(length)[:, None]], float(clock)))
-    return found
 
 
 def _paced(
     factors: MotionFactors, stretches: Sequence[_Stretches]
-) -> tuple[MotionFactors, FloatArray, list[_Stretches]]:
-    """Factors in units of their deviation, the rate of each, and the residuals of stretches."""
+) -> tuple[MotionFactors, FloatArray]:
+    """Factors in units of their deviation, and the rate of each, by what some columns show."""
     rates = decay(np.full(factors.count, START))
     for _ in range(ROUNDS):
         found = [_smoothed(factors, one, rates) for one in stretches]
@@ -190,32 +238,29 @@ def _paced(
         counts = np.array([one.mean.shape[1] for one in found], dtype=np.float64)
         following = np.stack([one.following.mean(axis=(0, 1)) for one in found])
         weights = (counts / counts.sum())[:, None] * squares
-        rates = _mean_rate(decay(following / squares), stretches, weights)
-        total = weights.sum(axis=0)
-        factors = factors.scaled(np.sqrt(total))
-    left = [
-        one._replace(frames=one.frames - factors.frames(_smoothed(factors, one, rates).mean))
-        for one in stretches
-    ]
-    return factors, rates, left
+        rates = _mean_rate(decay(following / squares), _clocks(stretches), weights)
+        factors = factors.scaled(np.sqrt(weights.sum(axis=0)))
+    return factors, rates
 
 
-def _mean_rate(
-    rates: FloatArray, stretches: Sequence[_Stretches], weights: FloatArray
-) -> FloatArray:
+def _clocks(stretches: Sequence[_Stretches]) -> FloatArray:
+    return np.array([one.clock for one in stretches])
+
+
+def _mean_rate(rates: FloatArray, clocks: FloatArray, weights: FloatArray) -> FloatArray:
     """Rates for frames of the first take, (q,), from those of each take's frames, by weights."""
     total = weights.sum(axis=0)
     even = np.full_like(weights, 1.0 / len(weights))
     shares = np.divide(weights, total, out=even, where=total > 0.0)
-    clocks = np.array([one.clock for one in stretches])
     return np.asarray((shares * (rates / clocks[:, None])).sum(axis=0))
 
 
 def _smoothed(factors: MotionFactors, stretches: _Stretches, rates: FloatArray) -> Smoothed:
-    """The factors of stretches, each on its own."""
-    windows, q = stretches.frames, factors.count
+    """The factors of stretches, each on its own, by what some columns show."""
+    part = part_of(len(factors.mean))
+    windows, q = stretches.at(part), factors.count
     shape = windows.shape[:2]
-    precision, pull = factors.information(windows.reshape(-1, windows.shape[2]))
+    precision, pull = factors.at(part).information(windows.reshape(-1, len(part)))
     own = np.minimum(rates * stretches.clock, QUICKEST)
     return smooth_factors(precision.reshape(*shape, q, q), pull.reshape(*shape, q), own)
 
@@ -226,19 +271,46 @@ def _squares(found: Smoothed) -> FloatArray:
     return np.asarray((found.mean**2 + own).mean(axis=(0, 1)))
 
 
-def _rest(left: Sequence[_Stretches], sigma: float) -> tuple[FloatArray, FloatArray]:
+class _Residuals(NamedTuple):
+    """What the factors leave of stretches, summed up."""
+
+    square: FloatArray  # (d,): Mean square; NaN where nothing was observed
+    # (takes, d): Mean square of the steps from frame to frame in each take, and their number
+    steps: FloatArray
+    counts: FloatArray
+
+    @classmethod
+    def of(cls, left: Sequence[FloatArray]) -> _Residuals:
+        """Of the residuals (length, n, d) of each take."""
+        steps = [np.diff(one, axis=0) for one in left]
+        counts = [(~np.isnan(own)).sum(axis=(0, 1), dtype=np.float64) for own in steps]
+        each = np.stack([_mean_square([own]) for own in steps])
+        return cls(_mean_square(left), each, np.stack(counts))
+
+
+def _residuals(
+    factors: MotionFactors, rates: FloatArray, stretches: Sequence[_Stretches]
+) -> _Residuals:
+    found = [_smoothed(factors, one, rates).mean for one in stretches]
+    parts = []
+    for columns in blocks(len(factors.mean), sum(one.rows.size for one in stretches)):
+        own = factors.at(columns)
+        left = [one.at(columns) - own.frames(z) for one, z in zip(stretches, found, strict=True)]
+        parts.append(_Residuals.of(left))
+    return _Residuals(*(np.concatenate(one, axis=-1) for one in zip(*parts, strict=True)))
+
+
+def _rest(left: _Residuals, clocks: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
     """Variance and rate of the residual of the factors, from stretches.
 
     A column that no stretch shows is taken to be like the others.
     """
-    variance = _mean_square([one.frames for one in left]) - sigma**2
+    variance = left.square - sigma**2
     variance = np.maximum(np.where(np.isnan(variance), np.nanmedian(variance), variance), 0.0)
     variance = np.maximum(variance, max(sigma**2 * 1e-2, LEAST_VARIANCE))
-    steps = [np.diff(one.frames, axis=0) for one in left]
-    rough = [np.maximum(_mean_square([own]) / 2.0 - sigma**2, 0.0) for own in steps]
-    rates = [decay(1.0 - np.where(np.isnan(own), variance, own) / variance) for own in rough]
-    counts = [(~np.isnan(own)).sum(axis=(0, 1), dtype=np.float64) for own in steps]
-    return variance, _mean_rate(np.stack(rates), left, np.stack(counts))
+    rough = np.maximum(left.steps / 2.0 - sigma**2, 0.0)
+    rates = decay(1.0 - np.where(np.isnan(rough), variance, rough) / variance)
+    return variance, _mean_rate(rates, clocks, left.counts)
 
 
 def _mean_square(parts: Sequence[FloatArray]) -> FloatArray:

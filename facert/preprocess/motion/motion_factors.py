@@ -9,19 +9,26 @@ columns, estimated through the same gaps, needs far more frames.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from facert.data.array_group import ArrayGroup
-from facert.data.arrays import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.blocks import blocks, spread
 
 ITERATIONS = 16
 COARSE, FINE = 0.1, 1e-3
 """Least standard deviation of the noise in the first and in the last iteration, normalised units.
 Large motion is learned first: with little noise from the start, the search hardly moves on."""
-MANY = 1500
-"""Columns, beyond which the covariance of all is dear."""
+PART = 600
+"""Of more columns the factors are learned from so many, evenly spread, which show all that moves
+many; the weights of the others follow in the last iteration."""
+IN_A_PRODUCT = 1 << 21
+"""Numbers of the frames that are looked at together."""
+FEW = 16
+"""Where a matrix hides less than one of so many entries, these alone are summed."""
 ONCE_MORE = 1.0
 """The prior of each weight counts as much as so many frames of its factor."""
 
@@ -42,8 +49,8 @@ class MotionFactors(ArrayGroup):
         ----------
         X : array, shape (n, d)
             Normalised frames; NaN: not observed.
-        filled : array, shape (n, d)
-            The same with a first guess in the gaps.
+        filled : array, shape (n, p)
+            The columns that `part_of` names, with a first guess in the gaps.
         sigma : float
             Standard deviation of the capture noise.
         count : int
@@ -51,18 +58,19 @@ class MotionFactors(ArrayGroup):
         """
         schedule = np.geomspace(max(COARSE, sigma), max(FINE, sigma), ITERATIONS)
         factors = cls._principal(filled, count, schedule[0])
-        seen = ~np.isnan(X)
-        for least in schedule:
-            z, covariance = factors.posterior(X)
-            factors = _maximised(np.where(seen, X, 0.0), seen, z, covariance, least)
+        some = _Shown.by(X[:, part_of(X.shape[1])])
+        for least in schedule[:-1]:
+            factors = _maximised(some, *factors._posterior(some), least)
+        factors = _maximised(_Shown.by(X), *factors._posterior(some), schedule[-1])
         return factors._turned()
 
     @classmethod
     def _principal(cls, X: FloatArray, count: int, least: float) -> MotionFactors:
-        variances, axes = _principal_axes(X)
+        covariance = np.cov(X, rowvar=False, bias=True).reshape(X.shape[1], X.shape[1])
+        variances, axes = np.linalg.eigh(covariance)  # rising
         count = min(count, len(variances))
-        kept = np.maximum(variances[:count], np.finfo(float).eps)
-        weights = axes[:, :count] * np.sqrt(kept)
+        kept = np.maximum(variances[::-1][:count], np.finfo(float).eps)
+        weights = axes[:, ::-1][:, :count] * np.sqrt(kept)
         left = np.maximum(X.var(axis=0) - (weights**2).sum(axis=1), 0.0)
         return cls(X.mean(axis=0), weights, left + least**2)
 
@@ -74,15 +82,25 @@ class MotionFactors(ArrayGroup):
         X : array, shape (n, d)
             NaN: not observed.
         """
-        seen = ~np.isnan(X)
-        weight = seen / self.noise
-        q = self.count
-        pull = (np.where(seen, X - self.mean, 0.0) * weight) @ self.weights
-        return (weight @ self._squares).reshape(-1, q, q), pull
+        parts = [
+            self._information(_Shown.by(X[rows]))
+            for rows in blocks(len(X), X.shape[1], IN_A_PRODUCT)
+        ]
+        precision, pull = (np.concatenate(one) for one in zip(*parts, strict=True))
+        return precision, pull
+
+    def _information(self, shown: _Shown) -> tuple[FloatArray, FloatArray]:
+        weighted, q = self.weights / self.noise[:, None], self.count
+        products = np.hstack([_products(self.weights, weighted), self.mean[:, None] * weighted])
+        sums = shown.sums(products)
+        return _symmetric(sums[:, :-q], q), shown.known @ weighted - sums[:, -q:]
 
     def posterior(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n, q) and covariance (n, q, q) of each frame's factors, regardless of time."""
-        precision, pull = self.information(X)
+        return self._posterior(_Shown.by(X))
+
+    def _posterior(self, shown: _Shown) -> tuple[FloatArray, FloatArray]:
+        precision, pull = self._information(shown)
         covariance = np.linalg.inv(precision + np.eye(precision.shape[1]))
         return np.einsum("nkl,nl->nk", covariance, pull), np.asarray(covariance)
 
@@ -92,13 +110,15 @@ class MotionFactors(ArrayGroup):
 
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Variance of W z, (n, d), for covariances of the factors, (n, q, q)."""
-        return np.asarray(covariance.reshape(len(covariance), -1) @ self._squares.T)
+        new = np.ones(len(covariance), dtype=np.bool_)
+        new[1:] = (covariance[1:] != covariance[:-1]).any(axis=(1, 2))
+        one, other = _pairs(self.count)
+        twice = np.where(one == other, 1.0, 2.0) * covariance[new][:, one, other]
+        return np.asarray((twice @ _products(self.weights, self.weights).T)[np.cumsum(new) - 1])
 
-    @property
-    def _squares(self) -> FloatArray:
-        """Products of each column's weights with each other, (d, q²)."""
-        W = self.weights
-        return np.asarray((W[:, :, None] * W[:, None, :]).reshape(len(W), -1))
+    def at(self, columns: slice | IntArray) -> MotionFactors:
+        """The same factors of some columns."""
+        return MotionFactors(self.mean[columns], self.weights[columns], self.noise[columns])
 
     @property
     def count(self) -> int:
@@ -119,35 +139,75 @@ class MotionFactors(ArrayGroup):
         return MotionFactors(self.mean, self.weights @ turn[:, ::-1], self.noise)
 
 
-def _principal_axes(X: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Variances, falling, and directions (d, r) of frames (n, d).
-
-    Of many columns the covariance is not made: their frames span few directions.
-    """
-    if X.shape[1] > max(MANY, len(X)):
-        _, spread, axes = np.linalg.svd(X - X.mean(axis=0), full_matrices=False)
-        return spread**2 / len(X), axes.T
-    covariance = np.cov(X, rowvar=False, bias=True).reshape(X.shape[1], X.shape[1])
-    variances, axes = np.linalg.eigh(covariance)
-    return variances[::-1], axes[:, ::-1]
+def part_of(columns: int) -> IntArray:
+    """The columns that factors are learned from."""
+    return spread(columns, PART)
 
 
-def _maximised(
-    X: FloatArray, seen: BoolArray, z: FloatArray, covariance: FloatArray, least: float
-) -> MotionFactors:
-    """Most likely mean, weights and noise given the factors' posterior; X is 0 where not seen."""
+def _pairs(q: int) -> tuple[IntArray, IntArray]:
+    """Rows and columns of the upper half of a symmetric matrix (q, q), each (q (q + 1) / 2,)."""
+    one, other = np.triu_indices(q)
+    return one, other
+
+
+def _products(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Upper halves of l rᵀ for rows (n, q) of each, (n, q (q + 1) / 2)."""
+    one, other = _pairs(left.shape[1])
+    return left[:, one] * right[:, other]
+
+
+def _symmetric(halves: FloatArray, q: int) -> FloatArray:
+    """Symmetric matrices (n, q, q) from their upper halves."""
+    number = np.empty((q, q), dtype=np.int64)
+    one, other = _pairs(q)
+    number[one, other] = number[other, one] = np.arange(len(one))
+    return halves[:, number]
+
+
+class _Shown(NamedTuple):
+    """What frames show, (n, d), 0 elsewhere; and what they hide, if anything."""
+
+    known: FloatArray
+    hidden: BoolArray | None
+
+    @classmethod
+    def by(cls, X: FloatArray) -> _Shown:
+        """What frames show, NaN: not observed."""
+        hidden = np.isnan(X)
+        return cls(np.where(hidden, 0.0, X), hidden) if hidden.any() else cls(X, None)
+
+    def sums(self, values: FloatArray, axis: int = 1) -> FloatArray:
+        """Sums of values (d, k) over what each frame shows; or, by axis 0, the other way round.
+
+        Where little is hidden, that is taken off the sum of all.
+        """
+        total, hidden = values.sum(axis=0), self.hidden
+        if hidden is None:
+            return np.tile(total, (self.known.shape[1 - axis], 1))
+        if FEW * np.count_nonzero(hidden) > hidden.size:
+            seen = (~hidden).astype(np.float64)
+            return np.asarray((seen if axis else seen.T) @ values)
+        sparse = csr_array(hidden, dtype=np.float64)
+        return np.asarray(total - (sparse if axis else sparse.T) @ values)
+
+
+def _maximised(shown: _Shown, z: FloatArray, covariance: FloatArray, least: float) -> MotionFactors:
+    """Most likely mean, weights and noise given the factors' posterior."""
     n, q = z.shape
     moments = np.empty((n, q + 1, q + 1))
     moments[:, :q, :q] = covariance + z[:, :, None] * z[:, None, :]
     moments[:, q, :q] = moments[:, :q, q] = z
     moments[:, q, q] = 1.0
-    sums = (seen.T.astype(np.float64) @ moments.reshape(n, -1)).reshape(-1, q + 1, q + 1)
+    one, other = _pairs(q + 1)
+    sums = shown.sums(moments[:, one, other], axis=0)
+    X = shown.known
     pull = X.T @ np.hstack([z, np.ones((n, 1))])
     prior = np.diag([*[ONCE_MORE] * q, 0.0])
-    rows = np.linalg.solve(sums + prior, pull[:, :, None])[:, :, 0]
-    left = (X**2).sum(axis=0) - 2.0 * (rows * pull).sum(axis=1)
-    left += np.einsum("di,dij,dj->d", rows, sums, rows)
-    noise = np.maximum(left / seen.sum(axis=0), least**2)
+    normal = _symmetric(sums, q + 1) + prior
+    rows = np.linalg.solve(normal, pull[:, :, None])[:, :, 0].astype(np.float64)
+    left = np.einsum("nd,nd->d", X, X) - 2.0 * (rows * pull).sum(axis=1)
+    left += (np.where(one == other, 1.0, 2.0) * sums * _products(rows, rows)).sum(axis=1)
+    noise = np.maximum(left / sums[:, -1], least**2)
     root = np.linalg.cholesky(moments[:, :q, :q].mean(axis=0))  # z has unit covariance again
     weights = np.asarray(rows[:, :q] @ root, dtype=np.float64)
-    return MotionFactors(rows[:, q].astype(np.float64), weights, noise)
+    return MotionFactors(rows[:, q], weights, noise)

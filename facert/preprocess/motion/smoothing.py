@@ -14,9 +14,8 @@ go on. Most of a take is like that, and costs a tenth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import lambertw
@@ -61,17 +60,6 @@ class FactorUpdate(NamedTuple):
     weight: FloatArray
 
 
-class SeriesUpdate(NamedTuple):
-    """Covariances (3, d) of value and velocity before and after a frame, and its gain (2, d)."""
-
-    before: FloatArray
-    after: FloatArray
-    gain: FloatArray
-
-
-Update = TypeVar("Update", FactorUpdate, SeriesUpdate)
-
-
 def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Smoothed:
     """Smooth factors, each of unit variance and moving as this file has it.
 
@@ -88,8 +76,7 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
     F, drift = factor_chain(a)
     if precision.ndim > 3 and (precision == precision[:, :1]).all():
         precision = precision[:, :1]  # all stretches are known equally well
-    P = np.broadcast_to(np.eye(2 * q), (*precision.shape[1:-2], 2 * q, 2 * q))
-    filtered = _forward(precision, P, lambda P: F @ P @ F.T + drift, factor_update, _settled)
+    filtered = _filtered(precision, F, drift)
     m = np.zeros((*pull.shape[1:-1], 2 * q))
     before, after = (np.empty((frames, *m.shape)) for _ in range(2))
     for t, update in enumerate(filtered):
@@ -99,37 +86,18 @@ def smooth_factors(precision: FloatArray, pull: FloatArray, a: FloatArray) -> Sm
     return _smoothed(filtered, F, before, after)
 
 
-def _forward(
-    frames: FloatArray | BoolArray,
-    P: FloatArray,
-    carry: Callable[[FloatArray], FloatArray],
-    see: Callable[[FloatArray, FloatArray], Update],
-    settled: Callable[[FloatArray, FloatArray], bool],
-) -> list[Update]:
-    """The filter's update at each frame; where covariances have settled, the very same object.
-
-    Parameters
-    ----------
-    frames : array, shape (T, ...)
-        What covariances depend on.
-    P : array
-        Covariances before the first frame.
-    carry : callable
-        Covariances at the next frame from those at one.
-    see : callable
-        The update from these covariances and one of the frames.
-    settled : callable
-        Whether two covariances are the same.
-    """
-    found: list[Update] = []
-    for frame, repeats in zip(frames, _repeats(frames), strict=True):
+def _filtered(precision: FloatArray, F: FloatArray, drift: FloatArray) -> list[FactorUpdate]:
+    """The filter's update at each frame; where covariances have settled, the very same object."""
+    P = np.broadcast_to(np.eye(len(F)), (*precision.shape[1:-2], *F.shape))
+    found: list[FactorUpdate] = []
+    for frame, repeats in zip(precision, _repeats(precision), strict=True):
         if repeats and len(found) > 1 and found[-1] is found[-2]:
             found.append(found[-1])
             continue
         if found:
-            P = carry(found[-1].after)
-        same = repeats and settled(P, found[-1].before)
-        found.append(found[-1] if same else see(P, frame))
+            P = F @ found[-1].after @ F.T + drift
+        same = repeats and _settled(P, found[-1].before)
+        found.append(found[-1] if same else factor_update(P, frame))
     return found
 
 
@@ -209,56 +177,63 @@ def smooth_series(
     -------
     mean, variance : array, shape (T, d)
     """
-    chain = series_chain(variance, a)
-    F, X = chain.F, np.where(seen, X, 0.0)
-    filtered = _series_filtered(seen, noise, chain)
-    before, after = (np.empty((len(X), 2, len(a))) for _ in range(2))
-    m = np.zeros((2, len(a)))
-    for t, update in enumerate(filtered):
-        before[t] = carried(F, m) if t else m
-        m = before[t] + update.gain * (X[t] - before[t, 0])
-        after[t] = m
-    return _series_smoothed(filtered, F, before, after)
-
-
-def _series_filtered(seen: BoolArray, noise: float, chain: SeriesChain) -> list[SeriesUpdate]:
-    """The filter's update at each frame (T, d)."""
-
-    def see(P: FloatArray, there: FloatArray) -> SeriesUpdate:
-        gain = np.where(there, P[:2] / (P[0] + noise), 0.0)
-        return SeriesUpdate(P, series_after(P, gain), gain)
-
-    return _forward(seen, chain.prior, chain.carry, see, _series_settled)
-
-
-def _series_smoothed(
-    filtered: list[SeriesUpdate], F: FloatArray, before: FloatArray, after: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Smoothed mean and variance of the value, (T, d); arguments as of `_smoothed`."""
-    frames, P = len(filtered), filtered[-1].after
-    variance = np.empty((frames, P.shape[1]))
-    variance[-1] = P[0]
-    settled = False
-    for t in range(frames - 2, -1, -1):
-        here, following = filtered[t], filtered[t + 1]
-        same = t + 2 < frames and here is following is filtered[t + 2]
+    chain, X = series_chain(variance, a), np.where(seen, X, 0.0)
+    mean, expected = _series_filtered(X, seen, noise, chain)
+    # What is seen from a frame on, of its value and velocity: precision (3, d), and that times m.
+    precision, pull = np.zeros((3, len(a))), np.zeros((2, len(a)))
+    F, spread = chain.F.swapaxes(0, 1), np.empty(X.shape)
+    back, settled = forward_covariance(F), False
+    for t in range(len(X) - 1, -1, -1):
+        same = t + 1 < len(X) and expected[t] is expected[t + 1]
         if not same:
-            gain = _series_gain(here.after, F, following.before)
-            backward = forward_covariance(gain)
+            p, q, _ = expected[t]
+            weight = seen[t] / (p + noise)
+            gain, keep = q * weight, 1.0 - p * weight
         if not (same and settled):
-            last, P = P, here.after + (backward * (P - following.before)).sum(axis=1)
-            settled = same and _series_settled(P, last)
-        variance[t] = P[0]
-        after[t] += carried(gain, after[t + 1] - before[t + 1])
-    return after[:, 0], variance
+            known = _and_seen(precision, weight, gain, keep)
+            left = p - (p * (p * known[0] + 2.0 * q * known[1]) + q * q * known[2])
+            last, precision = precision, (back * known).sum(axis=1)
+            settled = same and _series_settled(precision, last)
+        value, velocity = pull
+        value = keep * value - gain * velocity + weight * (X[t] - mean[t])
+        mean[t] += p * value + q * velocity
+        spread[t] = left
+        pull = F[:, 0] * value + F[:, 1] * velocity
+    return mean, spread
 
 
-def _series_gain(after: FloatArray, F: FloatArray, before: FloatArray) -> FloatArray:
-    """Gain P Fᵀ P'⁻¹, (2, 2, d), of covariances (3, d) after a frame and before the next."""
-    p, q, s = before
-    inverse = np.array([[s, -q], [-q, p]]) / (p * s - q * q)
-    cross = np.einsum("ijd,kjd->ikd", after[[[0, 1], [1, 2]]], F)
-    return np.asarray(np.einsum("ikd,kjd->ijd", cross, inverse))
+def _and_seen(
+    precision: FloatArray, weight: FloatArray, gain: FloatArray, keep: FloatArray
+) -> FloatArray:
+    """Precision (3, d) by the frames after one, and by what that itself shows."""
+    p, q, s = precision
+    mixed = keep * q - gain * s
+    return np.stack([weight + keep * (keep * p - gain * q) - gain * mixed, mixed, s])
+
+
+def _series_filtered(
+    X: FloatArray, seen: BoolArray, noise: float, chain: SeriesChain
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Means (T, d) and covariances, (3, d) each, before each frame is seen.
+
+    Where frames show the same and covariances have settled, these are the very same object.
+    """
+    mean, expected = np.empty(X.shape), [chain.prior]
+    m, gain, settled = np.zeros((2, X.shape[1])), np.zeros((2, X.shape[1])), False
+    for t, repeats in enumerate(_repeats(seen)):
+        P, settled = expected[-1], settled and bool(repeats)
+        if t:
+            m = carried(chain.F, m)
+            if not settled:
+                ahead = chain.carry(series_after(P, gain))
+                settled = bool(repeats) and _series_settled(ahead, P)
+                P = P if settled else ahead
+            expected.append(P)
+        if not settled:
+            gain = np.where(seen[t], P[:2] / (P[0] + noise), 0.0)
+        mean[t] = m[0]
+        m += gain * (X[t] - m[0])
+    return mean, expected
 
 
 def carried(F: FloatArray, m: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from facert.preprocess.motion import motion as room
-from facert.preprocess.motion.motion import Motion, _rest, _Stretches
+from facert.preprocess.motion.motion import Motion, _Residuals, _rest
 from facert.preprocess.motion.smoothing import smooth_factors, smooth_series, transition
 
 SIGMA = 0.2
@@ -27,7 +27,7 @@ def test_variance_and_rate_of_a_residual_are_found_through_capture_noise(rate):
     left = 0.5 * processes(40, 2000, rate, rng).reshape(40, 500, 4)
     left += 0.3 * rng.normal(size=left.shape)
     left[rng.random(left.shape) < 0.1] = np.nan
-    variance, rates = _rest([_Stretches(left, 1.0)], 0.3)
+    variance, rates = _rest(_Residuals.of([left]), np.ones(1), 0.3)
     np.testing.assert_allclose(variance, 0.5**2, rtol=0.15)
     np.testing.assert_allclose(rates, rate, rtol=0.15)
 

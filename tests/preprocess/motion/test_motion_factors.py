@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from facert.preprocess.motion import motion_factors
-from facert.preprocess.motion.motion_factors import MotionFactors, _maximised
+from facert.preprocess.motion.motion_factors import MotionFactors, _maximised, _Shown
 
 FRAMES, COLUMNS, FACTORS = 40, 6, 2
 TINY = 1e-6
@@ -26,8 +26,7 @@ def frames(share=0.3, seed=1):
 
 def stepped(factors, X):
     """The factors after one step."""
-    seen = ~np.isnan(X)
-    return _maximised(np.where(seen, X, 0.0), seen, *factors.posterior(X), TINY)
+    return _maximised(_Shown.by(X), *factors.posterior(X), TINY)
 
 
 def expected_factors(factors, x):
@@ -100,11 +99,22 @@ def test_the_search_goes_far_enough_that_another_step_changes_little():
     assert np.abs(again.weights @ again.weights.T - before).max() < 0.05 * np.abs(before).max()
 
 
-def test_many_columns_have_the_same_factors_without_their_covariance(monkeypatch):
+def test_factors_of_many_columns_are_learned_from_some_and_the_weights_of_all_follow(monkeypatch):
     rng = np.random.default_rng(3)
-    X = rng.normal(size=(12, 3)) @ rng.normal(size=(3, 20)) + 0.01 * rng.normal(size=(12, 20))
+    X = rng.normal(size=(60, 3)) @ rng.normal(size=(3, 40)) + 0.01 * rng.normal(size=(60, 40))
     plain = MotionFactors.learned(X, X, 0.01, 3)
-    monkeypatch.setattr(motion_factors, "MANY", 10)
-    spanned = MotionFactors.learned(X, X, 0.01, 3)
+    monkeypatch.setattr(motion_factors, "PART", 10)
+    from_some = MotionFactors.learned(X, X[:, motion_factors.part_of(40)], 0.01, 3)
     same = plain.weights @ plain.weights.T
-    np.testing.assert_allclose(spanned.weights @ spanned.weights.T, same, atol=1e-8)
+    np.testing.assert_allclose(from_some.weights @ from_some.weights.T, same, atol=0.01)
+    np.testing.assert_allclose(from_some.noise, plain.noise, rtol=1.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.6])
+def test_sums_over_what_is_seen_are_the_same_however_little_is_hidden(share):
+    rng = np.random.default_rng(0)
+    hidden = rng.random((30, 50)) < share
+    shown = _Shown.by(np.where(hidden, np.nan, 1.0))
+    for axis, seen in ((1, ~hidden), (0, ~hidden.T)):
+        values = rng.normal(size=(seen.shape[1], 4))
+        np.testing.assert_allclose(shown.sums(values, axis), seen @ values, atol=1e-12)

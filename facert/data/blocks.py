@@ -1,0 +1,26 @@
+"""Large arrays in blocks: what is made on the way then fits into the processor's cache."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from facert.data.arrays import IntArray
+
+AT_ONCE = 1 << 18
+"""Numbers of a block."""
+LEAST = 16
+"""Rows or columns of a block, at least: memory is read by as many."""
+
+
+def blocks(count: int, across: int, at_once: int = AT_ONCE) -> Iterator[slice]:
+    """Slices of `count` rows or columns, each of which has `across` numbers."""
+    width = max(at_once // max(across, 1), LEAST)
+    for start in range(0, count, width):
+        yield slice(start, min(start + width, count))
+
+
+def spread(count: int, most: int) -> IntArray:
+    """The indices of at most so many of `count` things, evenly spread."""
+    return np.linspace(0, count - 1, min(most, count)).round().astype(np.int64)
