@@ -13,11 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from facert.data.arrays import FloatArray
+from facert.models.leading_directions import DENSE, narrowed
 from facert.settings import Settings
 
 # Normalised units. Below the first, source mapping begins to stick to the training latents (their
 # predictive variance vanishes, see facert.models.kernels); above the second, small motion is lost.
 LEAST, MOST = 0.03, 0.1
+ENOUGH = 500
+"""Frames of a dense source that its noise is estimated from."""
 STEP = 0.3
 """Motion of a face from frame to frame where it is not given, normalised units."""
 
@@ -37,6 +40,7 @@ def expected_noise(X: FloatArray, latent_dim: int) -> float:
     float
         √λ_{q+1}, not below `LEAST` nor above `MOST`.
     """
+    X = narrowed(X[:: -(-len(X) // ENOUGH)]) if X.shape[1] > DENSE else X
     deviations = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) / np.sqrt(len(X))
     left_over = deviations[latent_dim] if latent_dim < len(deviations) else 0.0
     return float(np.clip(left_over, LEAST, MOST))

@@ -46,10 +46,18 @@ def method_class(name: str) -> type[Method]:
     return found
 
 
-def make_method(settings: Settings) -> Method:
-    """The method that the settings name, untrained; raises InputError as `require_known` does."""
+def make_method(settings: Settings, dense: bool = False) -> Method:
+    """The method that the settings name, untrained; raises InputError as `require_known` does.
+
+    One for a dense source sees it by its leading directions, see `facert.methods.dense`.
+    """
     require_known(settings)
-    return method_class(settings.method)(settings)
+    method = method_class(settings.method)(settings)
+    if not dense:
+        return method
+    from facert.methods.dense import Dense, DenseStepwise
+
+    return DenseStepwise(method) if method.stepwise else Dense(method)
 
 
 def require_known(settings: Settings) -> None:

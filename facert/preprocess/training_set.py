@@ -15,6 +15,7 @@ from facert.data.takes import Takes
 from facert.data.text import listed
 from facert.errors import InputError
 from facert.models.gaussian import Gaussian
+from facert.models.leading_directions import DENSE, LeadingDirections
 from facert.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -65,7 +66,6 @@ def choose_training_set(given: Take | Takes, settings: Settings) -> TrainingSet:
     others = order[serves[order] & ~np.isin(order, labels)]
     unlabelled = np.sort(others[: settings.unlabelled])
     assert take.params is not None  # there are labels
-    require_square(X.shape[1], "/source", "Train on fewer markers.")
     require_square(take.params.shape[1], "/target/params", "Train on fewer controls.")
     require_square(len(labels), "/target/params, poses", "Ask for fewer: --labels 100.")
     filled = _filled(X, np.concatenate([labels, unlabelled]), rng)
@@ -140,4 +140,6 @@ def _filled(X: FloatArray, rows: IntArray, rng: np.random.Generator) -> FloatArr
     seen = ~np.isnan(X)
     unseen = ~seen[support].any(axis=0)
     support = np.concatenate([support, np.unique(seen[:, unseen].argmax(axis=0))])
+    if X.shape[1] > DENSE:
+        return LeadingDirections.learned(X[support]).fill(X[rows])[0]
     return Gaussian.of(X[support]).fill(X[rows])

@@ -21,6 +21,7 @@ from facert.data.regions import Region, Regions
 from facert.data.take import Take
 from facert.errors import InputError
 from facert.models.gaussian import fill_gaps
+from facert.models.leading_directions import DENSE, LeadingDirections
 from facert.models.loo import KernelRidge
 from facert.models.whitening import whitening
 from facert.regions.bipartition import two_groups
@@ -141,6 +142,9 @@ def label_errors(frames: FloatArray, labelled: FloatArray, poses: FloatArray) ->
     """
     if not frames.shape[1]:
         return np.ones(poses.shape[1])
+    if frames.shape[1] > DENSE:
+        directions = LeadingDirections.learned(frames)
+        frames, labelled = directions.scores(frames), directions.scores(labelled)
     features = (labelled - labelled.mean(axis=0)) @ whitening(frames, POWER)
     K, Y = features @ features.T, poses - poses.mean(axis=0)
     scale, variances = float(np.trace(K)) / len(K), np.sum(Y**2, axis=0)

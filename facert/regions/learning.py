@@ -14,6 +14,7 @@ from facert.data.regions import Regions
 from facert.methods.base import Labelled, Method, TrainingReport, Unlabelled, WarmStart
 from facert.methods.noise import with_noise
 from facert.methods.registry import method_class
+from facert.models.leading_directions import DENSE
 from facert.models.optim.monitor import Monitor
 from facert.preprocess.preparation import TrainingData
 from facert.regions.automatic import find_regions
@@ -80,7 +81,8 @@ def learn(
     given = replace(settings, regions=regions, sigma_t=step)
     source, target, chosen = data.prepared.units, data.target_units, data.chosen
     layout = None if regions is None else lay_out(regions, data, given)
-    method = untrained_method(with_noise(given, source.apply(data.complete)), layout)
+    dense = len(source.mean) > DENSE
+    method = untrained_method(with_noise(given, source.apply(data.complete)), dense, layout)
     if start is not None and method_class(given.method).stepwise:
         _begin(method, start, source, target)
     labelled = Labelled(source.apply(chosen.X_labelled), target.apply(chosen.Y_labelled))
@@ -114,6 +116,8 @@ def _begin(
     forms = ("method", "latent_dim", "regions")
     other = next((name for name in forms if getattr(new, name) != getattr(old, name)), None)
     other = other or start.difference
+    if other is None and type(method) is not type(start.method):
+        other = "form"  # of an earlier release, which took a dense source as it is
     if other is not None:
         log.warning("training begins anew: the start has another %s", other)
         return

@@ -15,7 +15,7 @@ region of everything is the method itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Self
@@ -43,7 +43,9 @@ from facert.methods.base import (
     Unlabelled,
     WarmStart,
 )
+from facert.methods.dense import is_dense
 from facert.methods.registry import make_method
+from facert.models.leading_directions import DENSE
 from facert.models.optim.monitor import Monitor
 from facert.settings import Settings
 
@@ -144,7 +146,7 @@ class Regional:
     def __init__(self, settings: Settings, layout: RegionLayout | None = None) -> None:
         self.settings = settings
         if layout is not None:
-            self._set_layout(layout)
+            self._set_layout(layout, layout.columns.sum(axis=1) > DENSE)
 
     @property
     def dimensions(self) -> tuple[int, int]:
@@ -231,9 +233,10 @@ class Regional:
         require_known_arrays([n for n in arrays if not n.startswith(tuple(parts))], layout)
         sizes = check_axes(arrays, layout)
         self._require_count(sizes["r"])
-        untrained = make_method(replace(self.settings, regions=None))
+        whole = replace(self.settings, regions=None)
         for name, part in zip(self._names, parts, strict=True):
-            d_x, d_y = untrained.check(part_of(arrays, part))
+            own = part_of(arrays, part)
+            d_x, d_y = make_method(whole, is_dense(own)).check(own)
             if d_x > sizes["x"] or d_y > sizes["y"]:
                 expected = f"at most {sizes['x']} and {sizes['y']} columns"
                 raise InputError(f"region {name}", expected, f"{d_x} and {d_y}", DAMAGED)
@@ -248,9 +251,10 @@ class Regional:
             When an array is absent or the shapes do not fit together.
         """
         self.check(arrays)
-        self._set_layout(RegionLayout.of(arrays, "layout."))
+        own = [part_of(arrays, f"{index}.") for index in range(len(self._names))]
+        self._set_layout(RegionLayout.of(arrays, "layout."), [is_dense(part) for part in own])
         for index, part in enumerate(self.parts_):
-            part.method.load(part_of(arrays, f"{index}."))
+            part.method.load(own[index])
             if part.method.dimensions != (len(part.columns), len(part.controls)):
                 expected = f"{len(part.columns)} and {len(part.controls)} columns"
                 found = f"{part.method.dimensions}"
@@ -265,17 +269,17 @@ class Regional:
         if count != len(self._names):
             raise InputError("layout", f"{len(self._names)} regions", f"{count}", DAMAGED)
 
-    def _set_layout(self, layout: RegionLayout) -> None:
+    def _set_layout(self, layout: RegionLayout, dense: Iterable[bool]) -> None:
         self._require_count(len(layout.columns))
         self.layout_ = layout
-        self.parts_ = [self._part(index) for index in range(len(layout.columns))]
+        self.parts_ = [self._part(index, bool(own)) for index, own in enumerate(dense)]
 
-    def _part(self, index: int) -> _RegionMethod:
+    def _part(self, index: int, dense: bool) -> _RegionMethod:
         layout = self.layout_
         sigma_c, floor = layout.noise[index].tolist()
         own = replace(self.settings, regions=None, sigma_c=sigma_c, source_noise_floor=floor)
         return _RegionMethod(
-            make_method(own),
+            make_method(own, dense),
             np.flatnonzero(layout.columns[index]),
             np.flatnonzero(layout.weights[index]),
             *layout.units[index].tolist(),
@@ -297,14 +301,15 @@ class Regional:
         return Prediction(poses, np.sqrt(variances) if has_std else None, source)
 
 
-def untrained_method(settings: Settings, layout: RegionLayout | None = None) -> Method:
+def untrained_method(settings: Settings, dense: bool, layout: RegionLayout | None = None) -> Method:
     """The method of the settings; with regions, one that has it for each of them.
 
-    Without a layout, a regional method is ready for `Method.load` alone.
+    Without a layout, a regional method is ready for `Method.load` alone. Of a dense source the
+    method, or that of a region that is dense itself, sees the leading directions.
     """
     if settings.regions is not None:
         return Regional(settings, layout)
-    return make_method(settings)
+    return make_method(settings, dense)
 
 
 def _of_region(face: Normalisation, columns: IntArray, old: float, new: float) -> Normalisation:

@@ -26,6 +26,7 @@ from facert.errors import InputError, NumericalError, reading
 from facert.io.guarded import parsing
 from facert.io.tensors import FIX, read_tensors, write_tensors
 from facert.methods.base import Method
+from facert.methods.dense import is_dense
 from facert.preprocess.known_poses import MOST
 from facert.preprocess.motion.motion import FACTORS, Motion
 from facert.preprocess.source_layout import SourceLayout
@@ -201,7 +202,7 @@ def read_model(path: Path, make: type[Model]) -> Model:
     methods: list[Method] = []
 
     def check(declared: Mapping[str, Shaped], metadata: ModelMetadata) -> None:
-        methods.append(_untrained(metadata))
+        methods.append(_untrained(metadata, is_dense(part_of(declared, "method."))))
         _check_shapes(declared, metadata, methods[0])
 
     arrays, metadata = read_tensors(path, FORMAT, ModelMetadata, check)
@@ -257,11 +258,11 @@ def _made(
     )
 
 
-def _untrained(metadata: ModelMetadata) -> Method:
+def _untrained(metadata: ModelMetadata, dense: bool) -> Method:
     """The method that a file is of."""
     settings = Settings().with_changes(dict(metadata.settings))
     try:
-        return untrained_method(settings)
+        return untrained_method(settings, dense)
     except InputError as error:
         error.fix = "Install the facert that wrote it."
         raise
