@@ -190,7 +190,13 @@ class _Worker:
                 continue
 
     def _reason(self) -> str:
+        from facert.evaluation.worker import NO_MEMORY
+
         status = self._process.wait()
         how = f"by {signal.Signals(-status).name}" if status < 0 else f"with status {status}"
         advice = "if for lack of memory, use fewer --jobs"
+        if status == NO_MEMORY:
+            how, advice = "for lack of memory", "use fewer --jobs"
+        elif -status == getattr(signal, "SIGXCPU", None):
+            how, advice = "at the limit of CPU time", "raise ulimit -t"
         return f"a process was killed; it ended {how}, and again when tried alone; {advice}"

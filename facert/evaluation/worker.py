@@ -17,6 +17,8 @@ from facert.errors import FacertError
 
 LENGTH = 8  # bytes in front of a message that say how long it is
 ENDED = 128 + signal.SIGTERM
+NO_MEMORY = 70
+"""The exit status of a worker that has no memory for its calls."""
 AGAIN = 0.02  # seconds until it is tried again to end
 
 
@@ -60,6 +62,8 @@ def main(parent: int) -> None:
             send(results, _outcome(function, calls.get()))
     except SystemExit:  # asked to end, and everything is cleaned up
         os._exit(ENDED)
+    except MemoryError:
+        os._exit(NO_MEMORY)
 
 
 def _outcome(function: Any, call: bytes) -> bytes:
@@ -82,6 +86,8 @@ def _listen(calls: SimpleQueue[bytes]) -> NoReturn:
             calls.put(receive(sys.stdin.buffer))
     except (EOFError, OSError):
         os._exit(ENDED)
+    except MemoryError:  # or the parent would wait for ever
+        os._exit(NO_MEMORY)
 
 
 def _end_with(parent: int) -> None:

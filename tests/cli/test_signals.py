@@ -30,10 +30,12 @@ try:
             time.sleep(5)
         finally:
             print("cleaned up", flush=True)
-except KeyboardInterrupt:
-    os.write(2, b"stopped\\n")
+except KeyboardInterrupt as stop:
+    said = ": ".join(["stopped", *getattr(stop, "__notes__", [])])
+    os.write(2, f"{{said}}\\n".encode())
     sys.exit(signals.status)
 """
+LIMIT = "the limit of CPU time (ulimit -t) is reached"
 DESTRUCTOR = """
 class Thing:
     def __del__(self):
@@ -144,3 +146,12 @@ def test_a_fork_leaves_the_signals_to_its_parent():
 )
 def test_whatever_is_raised_is_one_line(error, status, text):
     assert (exit_status(error), described(error)) == (status, text)
+
+
+def test_the_limit_of_cpu_time_is_told_and_comes_again_without_haste():
+    """Schedulers set it, and by itself the signal would end a process without a word."""
+    again = "ask()\n        except KeyboardInterrupt:\n            ask()\n            raise"
+    ended = run(again, number="signal.SIGXCPU")
+    assert (ended.stderr, ended.returncode) == (f"stopped: {LIMIT}\n", 128 + signal.SIGXCPU)
+    ended = run("pass", before="ask()", number="signal.SIGXCPU")
+    assert ended.stderr == f"stopped: {LIMIT}\n"

@@ -1,6 +1,7 @@
 """What is called in processes of their own: a module that is loaded at once."""
 
 import os
+import pickle
 import signal
 import time
 from pathlib import Path
@@ -51,3 +52,18 @@ def ended_while_writing(folder):
     with create(Path(folder, f"{os.getpid()}.h5"), "a", 1, False):
         pass
     time.sleep(5.0)
+
+
+class Heavy:
+    """What no message can hold for want of memory."""
+
+    def __reduce__(self):
+        raise MemoryError
+
+
+def at_its_end(_folder, end):
+    """Come to the limit of CPU time, or to a result for which there is no memory at all."""
+    if end == "time":
+        os.kill(os.getpid(), signal.SIGXCPU)
+    pickle.dumps = lambda _message: Heavy().__reduce__()
+    return Heavy()

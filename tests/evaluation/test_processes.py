@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from calls import deed, ended_while_writing, reason_of, refuse
+from calls import at_its_end, deed, ended_while_writing, reason_of, refuse
 
 from facert.errors import FacertError, InputError
 from facert.evaluation.processes import call_each
@@ -73,3 +73,12 @@ def test_processes_end_with_their_parent(tmp_path, number):
         assert time.monotonic() < until
         time.sleep(0.01)
     assert bool(list(tmp_path.iterdir())) == (number == signal.SIGKILL)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGXCPU"), reason="the system has no such limit")
+def test_a_process_without_time_or_memory_ends_and_says_so(tmp_path):
+    """One that failed to send its result would otherwise end in a traceback, or be waited for."""
+    calls = [(tmp_path, "time"), (tmp_path, "memory")]
+    told = " ".join(call_each(at_its_end, calls, 2, lost=lambda *call: f"{call[1]}: {call[2]}"))
+    assert "time: a process was killed; it ended at the limit of CPU time" in told
+    assert "memory: a process was killed; it ended for lack of memory" in told

@@ -2,9 +2,10 @@
 
 Python's own way is to raise KeyboardInterrupt wherever the main thread is, for Ctrl-C alone. Raised
 in an import, a destructor or a callback of C it ends in a traceback, or in nothing; while C code
-computes it is not raised at all. Here SIGINT, SIGTERM and SIGHUP are one thing, which is raised
-where Python code can take it, and a thread sees to it that the process ends in any case. Before a
-command begins nothing is at stake, and the process ends at once; so it does at a second signal.
+computes it is not raised at all. Here SIGINT, SIGTERM, SIGHUP and SIGXCPU are one thing, which is
+raised where Python code can take it, and a thread sees to it that the process ends in any case.
+Before a command begins nothing is at stake, and the process ends at once; so it does at a second
+signal.
 
 Nothing heavy is imported: the handlers stand before the rest of facert is loaded.
 """
@@ -26,8 +27,13 @@ if TYPE_CHECKING:
     from types import FrameType
 
 ENDING = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGXCPU")
+    if hasattr(signal, name)
 )
+CPU_TIME = getattr(signal, "SIGXCPU", None)
+"""It comes again every second, until the system kills a process that does not end."""
+REASONS = {CPU_TIME: "the limit of CPU time (ulimit -t) is reached"}
 TICK = 0.05  # seconds between two tries to raise it
 STUCK = 2.0  # seconds until a process ends that comes to no place where it can be raised
 GRACE = 20.0  # seconds for cleaning up and keeping what was done, after it was raised
@@ -98,6 +104,8 @@ class Signals:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.number is not None and not self._unraised:
+            if number == self.number == CPU_TIME:
+                return
             self._end()
         self.number = number
         if self._instead is not None:
@@ -107,7 +115,10 @@ class Signals:
         else:
             self._unraised = not can_raise(frame)
             if not self._unraised:
-                raise Stopped
+                stopped = Stopped()
+                if number in REASONS:
+                    stopped.add_note(REASONS[number])
+                raise stopped
 
     def _watch(self, pipe: int) -> None:
         """End the process some time after a signal, whatever the main thread does."""
@@ -142,7 +153,8 @@ class Signals:
     def _end(self) -> None:
         """End the process at once; what it was writing has a temporary name."""
         with suppress(OSError):
-            os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + b"stopped\n")
+            said = ": ".join(["stopped", *filter(None, [REASONS.get(self.number)])])
+            os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + f"{said}\n".encode())
         os._exit(self.status)
 
 
