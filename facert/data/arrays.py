@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,13 +46,20 @@ def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
 
 
 def float_array(value: ArrayLike, path: str) -> FloatArray:
-    """A float64 array; a copy, so that freezing it never touches the caller's."""
-    array = np.array(value)
+    """A float64 array that may be frozen: the caller's where it is so already, else a copy."""
+    array = np.asarray(value)
     if array.dtype.kind not in "fiu" or not array.size:
         raise InputError(
             path, "numbers", f"{array.dtype} {array.shape}", "Write a numeric array with data."
         )
-    return array.astype(np.float64)
+    return array if array.dtype == np.float64 and is_frozen(array) else array.astype(np.float64)
+
+
+def is_frozen(array: NDArray[Any]) -> bool:
+    """Whether an array, or another view of all of it, was made read-only: nobody changes it."""
+    owner = array if array.base is None else array.base
+    whole = isinstance(owner, np.ndarray) and owner.flags.owndata and owner.nbytes == array.nbytes
+    return whole and not (owner.flags.writeable or array.flags.writeable)
 
 
 def require_shape(

@@ -67,7 +67,7 @@ class Source:
             expected = "finite numbers, or NaN for what was not observed"
             raise InputError(path, expected, "infinite values", "Replace them by NaN.")
         if values.ndim == 3:
-            values[np.isnan(values).any(axis=2)] = np.nan
+            values = _whole_markers(values)
         if np.isnan(values).all():
             found = "NaN or invalid everywhere"
             raise InputError(path, "at least one observed value", found, "Check the export.")
@@ -102,6 +102,16 @@ class Source:
         if not others:
             return self
         return Source(np.concatenate([self.values, *(one.values for one in others)]), self.names)
+
+
+def _whole_markers(values: FloatArray) -> FloatArray:
+    """Positions (T, M, 3) of which none is known in part, copied only where one was."""
+    hidden = np.isnan(values)
+    in_part = hidden.any(axis=2) & ~hidden.all(axis=2)
+    if in_part.any():
+        values = values.copy()
+        values[in_part] = np.nan
+    return values
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray, require_shape
+from facert.data.arrays import FloatArray, frozen, require_shape
 from facert.data.take import Controls, Corrections, Source, Take
 from facert.errors import InputError
 from facert.io.guarded import parsing
@@ -71,14 +71,14 @@ def read_take(path: Path) -> Take:
     """
     with open_guarded(path) as file:
         file.require_format(TAKE_FORMAT, VERSION)
-        params = file.optional("/target/params")
+        params = _frozen(file, "/target/params")
         return Take(
             time=file.numbers("/time"),
             source=_read_source(file),
             controls=_read_controls(file),
             params=params,
-            std=file.optional("/target/std"),
-            animation=file.optional("/animation/params"),
+            std=_frozen(file, "/target/std"),
+            animation=_frozen(file, "/animation/params"),
             fps=file.number_attribute("fps"),
             units=file.text_attribute("units"),
             start_timecode=file.text_attribute("start_timecode"),
@@ -199,7 +199,13 @@ def _read_source(file: GuardedFile, root: str = "/source") -> Source:
         valid, fix = file.flags(f"{root}/valid"), "Give one flag a frame and marker or weight."
         require_shape(valid.shape, values.shape[:2], f"{root}/valid", fix)
         values[~valid] = np.nan
-    return Source(values, file.names(f"{root}/names"))
+    return Source(frozen(values), file.names(f"{root}/names"))
+
+
+def _frozen(file: GuardedFile, path: str) -> FloatArray | None:
+    """The numbers at a path, if there are any, for a take to hold as they are."""
+    found = file.optional(path)
+    return None if found is None else frozen(found)
 
 
 def _read_controls(file: GuardedFile) -> Controls | None:
