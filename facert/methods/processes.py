@@ -16,6 +16,7 @@ from facert.data.memory import FLOAT, require_memory
 from facert.errors import InputError
 from facert.methods.base import Labelled
 from facert.methods.regression import Map, Variance
+from facert.methods.waiting_frames import WaitingFrames
 from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.gp.jitter import inverted, lower_factor
 from facert.models.kernels import RegressionKernel, squared_exponential
@@ -156,6 +157,7 @@ class ProcessBank:
         self._alpha = np.stack([process.process.alpha for process in processes])
         self._means = np.stack([process.mean for process in processes])[:, None]
         self._maps = [process.process for process in processes]
+        self._waiting = WaitingFrames()
         self._rows = max(1, MOST_KERNELS // (len(processes) * self._norms.shape[2]))
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, Variance]:
@@ -182,6 +184,8 @@ class ProcessBank:
         k += self._half_theta4 * products.take(self._of, axis=0)
         poses = np.matmul(k, self._alpha)
         poses += self._means
+        if len(X) == 1 and k.shape[2] > SMALL:
+            return poses, self._waiting.add(k, squares, self._variances)
         return poses, lambda: self._variances(k, squares)
 
     def _variances(self, k: FloatArray, squares: FloatArray) -> FloatArray:

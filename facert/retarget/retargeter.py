@@ -15,9 +15,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from facert.data.arrays import FloatArray
+from facert.data.arrays import FloatArray, frozen
 from facert.data.take import Source, Take
 from facert.errors import InputError
+from facert.methods.base import Method, Prediction
 from facert.models.threads import threads_for
 from facert.preprocess.clean_source import clean_source
 from facert.preprocess.motion.estimate import FEWEST
@@ -34,6 +35,10 @@ from facert.retarget.stream import RetargetStream
 log = logging.getLogger(__name__)
 
 Mode = Literal["offline", "online"]
+PART = 2**14
+"""Frames that are mapped at a time: what that takes beside the result is bounded."""
+TOGETHER = 64
+"""Frames that are mapped one after the other before their standard deviations are asked for."""
 JUDGED = {"judged": True}
 """The mark of lines of the log that a verdict repeats."""
 
@@ -116,16 +121,22 @@ class Retargeter(TrainedModel):
         """Map all frames at once: smoothed over time, then in one batch."""
         found = clean_source(take, self.layout, self.source_units, self.neutral, options)
         adjust = options.adjustments or Adjustments.none(len(self.controls.names))
-        predicted = self.method.predict(found.clean, found.input_variance)
+        predicted = _in_parts(self.method, found.clean, found.input_variance)
         if found.std is not None and not adjust.smooth_all:
-            rough = self.method.predict(found.filled, found.input_variance)
+            rough = _in_parts(self.method, found.filled, found.input_variance)
             predicted = replace(predicted, Y=adjust.mixed(predicted.Y, rough.Y))
+        seen, deviations = found.source, found.std
+        del found  # of a long take the rest is several times as large
         if len(predicted.X) >= FEWEST:  # shares of single frames mean nothing
             self._warn_of_novelty(predicted.X)
         scale = PoseScale(self.target_units, self.bounds, adjust)
         params, std = scale.params(predicted.Y), scale.std(predicted.std)
         require_finite(predicted.Y, params, std)
-        source = found.source.with_matrix(self.source_units.undo(predicted.X), found.std)
+        cleaned = frozen(self.source_units.undo(predicted.X))
+        source = seen.with_matrix(cleaned, deviations)
+        for poses in (params, std):
+            if poses is not None:
+                frozen(poses)  # the take holds them as they are
         return self._performance(take, source, params, std)
 
     def _one_by_one(self, take: Take, options: RetargetOptions) -> Take:
@@ -134,8 +145,11 @@ class Retargeter(TrainedModel):
         rest = clean_source(take, self.layout, self.source_units, self.neutral, whole).rest
         columns = self.layout.columns(take.source.names, quiet=True)  # cleaning logged it
         stream = self.stream(columns, 1.0 / even_grid(take.time)[1], options, rest)
+        frames, steps = take.source.values, []
         with threads_for(1):
-            steps = [stream.step(frame).complete() for frame in take.source.values]
+            for first in range(0, len(frames), TOGETHER):
+                made = [stream.step(frame) for frame in frames[first : first + TOGETHER]]
+                steps += [step.complete() for step in made]
         stds = [step.std for step in steps if step.std is not None]
         return self._performance(
             take,
@@ -172,6 +186,21 @@ class Retargeter(TrainedModel):
             corrections=None,
             model=self.description,
         )
+
+
+def _in_parts(method: Method, frames: FloatArray, variance: FloatArray | None) -> Prediction:
+    """What a method predicts for frames (T, d_x), each on its own; see `Method.predict`."""
+    if len(frames) <= PART:
+        return method.predict(frames, variance)
+    starts = range(0, len(frames), PART)
+    rows = [slice(start, start + PART) for start in starts]
+    parts = [method.predict(frames[r], None if variance is None else variance[r]) for r in rows]
+    stds = [part.std for part in parts if part.std is not None]
+    return Prediction(
+        np.concatenate([part.Y for part in parts]),
+        np.concatenate(stds) if stds else None,
+        np.concatenate([part.X for part in parts]),
+    )
 
 
 def load(path: str | Path) -> Retargeter:
