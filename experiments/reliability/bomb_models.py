@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +14,11 @@ import numpy as np
 
 from experiments.reliability.bomb_registry import BOMBS, READ, Bomb, write_take
 from experiments.reliability.bomb_tables import honest, markers
+from facert import load
 
 MODEL = ("inspect FILE", "retarget DIR/take.csv DIR/out.h5 --model FILE")
+OWN_TAKE = ("inspect FILE", "retarget DIR/take.h5 DIR/out.h5 --model FILE")
+MODELS = Path(__file__).parents[2] / "tests" / "retarget" / "models"
 SEQUENCE = ("inspect FILE", "render FILE DIR/out.png", "convert FILE DIR/out.glb",
             "render FILE DIR/out.png --beside FILE")  # fmt: skip
 FOLDER = (*READ, "render DIR/take.h5 DIR/out.png --rig FILE",
@@ -35,6 +39,49 @@ def model(shape: list[int], kept: int, claimed: int | None = None) -> Callable[[
         return path
 
     return make
+
+
+def posed(method: str, poses: int) -> Callable[[Path], Path]:
+    """A model of so many poses, which are a hole; all else is as it was learned."""
+
+    def make(folder: Path) -> Path:
+        take, few = MODELS / "take.h5", 12
+        (folder / "take.h5").write_bytes(take.read_bytes())
+        path = folder / "bomb.safetensors"
+        load(MODELS / f"{method}.safetensors").save(path)
+        content = path.read_bytes()
+        start = 8 + int.from_bytes(content[:8], "little")
+        header = json.loads(content[8:start])
+        about = json.loads(header.pop("__metadata__")["facert"])
+        head: dict[str, Any] = {"__metadata__": {"facert": json.dumps(_grown(about, few, poses))}}
+        parts, end = [], 0
+        for name, one in sorted(header.items(), key=lambda item: item[1]["data_offsets"]):
+            shape = [poses if size == few else size for size in one["shape"]]
+            if shape == one["shape"]:
+                first, last = one["data_offsets"]
+                parts.append((end, content[start + first : start + last]))
+            size = 8 * math.prod(shape)
+            head[name] = {"dtype": "F64", "shape": shape, "data_offsets": [end, end + size]}
+            end += size
+        text = json.dumps(head).encode()
+        with path.open("wb") as file:
+            file.write(struct.pack("<Q", len(text)) + text)
+            for place, values in parts:
+                file.seek(8 + len(text) + place)
+                file.write(values)
+            file.truncate(8 + len(text) + end)
+        return path
+
+    return make
+
+
+def _grown(value: Any, few: int, many: int) -> Any:
+    """A JSON value with one number in place of another."""
+    if isinstance(value, dict):
+        return {key: _grown(inner, few, many) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_grown(inner, few, many) for inner in value]
+    return many if type(value) is int and value == few else value
 
 
 def sequence(frames: int, vertices: int, faces: int, packed: bool) -> Callable[[Path], Path]:
@@ -77,6 +124,8 @@ for name, make in {
     "10^5 dimensions": model([1] * 100_000, 8),
 }.items():
     BOMBS[f"model {name}"] = Bomb(make, MODEL)
+for method in ("auto", "gpr", "nearest", "pls", "rbf", "regions", "ridge", "ssgpr", "svr"):
+    BOMBS[f"model {method} of 50,000 poses"] = Bomb(posed(method, 50_000), OWN_TAKE)
 for name, make in {
     "5 million vertices, never written": sequence(4, 5_000_000, 1, False),
     "5 million vertices, packed": sequence(4, 5_000_000, 1, True),

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from facert.data.array_group import Shaped
 from facert.data.arrays import FloatArray
@@ -139,10 +139,8 @@ def read_tensors(
             expected = f"a file of {_LENGTH.size + length + content} bytes"
             raise _damaged("the header", expected, f"{size} bytes")
         check(declared, metadata)
-        FileMemory(path).require(2 * content, "the arrays")
-        file.seek(0)
-        with parsing("the header", "a valid safetensors header", FIX):
-            arrays = load(file.read())
+        FileMemory(path).require(content, "the arrays")
+        arrays = _arrays(file, declared)
         for name, array in arrays.items():
             if not np.isfinite(array).all():
                 raise _damaged(name, "finite float64 numbers", "NaN or infinity")
@@ -164,6 +162,19 @@ def _header(file: BinaryIO, size: int) -> tuple[int, dict[str, Any]]:
     with parsing("the header", "a valid safetensors header", FIX):
         header: dict[str, Any] = parse_json(file.read(length).decode())
     return length, header
+
+
+def _arrays(file: BinaryIO, declared: Mapping[str, Declared]) -> dict[str, FloatArray]:
+    """The arrays behind the header, read one after the other: there is no copy of them all."""
+    arrays, end = {}, 0
+    for name, one in sorted(declared.items(), key=lambda item: item[1].data_offsets):
+        if one.data_offsets != (end, end + FLOAT * one.size):
+            expected = f"data_offsets [{end}, {end + FLOAT * one.size}]"
+            raise _damaged(name, expected, f"{list(one.data_offsets)}")
+        end = one.data_offsets[1]
+        with parsing(name, "an array of float64", FIX):
+            arrays[name] = np.fromfile(file, "<f8", one.size).reshape(one.shape)
+    return arrays
 
 
 def _metadata(path: Path, entry: object, expected: str, kind: type[Kind]) -> Kind:

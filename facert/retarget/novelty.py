@@ -106,10 +106,18 @@ def relevance(
     centred, count = poses - poses.mean(axis=0), len(posed)
     if count < TELLING:
         return np.ones(len(names))
-    square = centred @ centred.T
-    ridge = max(RIDGE * float(np.trace(square)) / count, np.finfo(np.float64).tiny)
-    hat = np.linalg.solve(square + ridge * np.eye(count), square) + 1.0 / count
-    missed = np.square((posed - hat @ posed) / (1.0 - np.diag(hat))[:, None]).mean(axis=0)
+    ridge = RIDGE * float(np.square(centred).sum()) / count
+    ridge = max(ridge, np.finfo(np.float64).tiny)
+    if count > centred.shape[1]:  # (CCᵀ + μ I)⁻¹ CCᵀ = C (CᵀC + μ I)⁻¹ Cᵀ, of the smaller side
+        square = centred.T @ centred
+        back = np.linalg.solve(square + ridge * np.eye(len(square)), centred.T)
+        predicted, own = centred @ (back @ posed), np.einsum("lp,pl->l", centred, back)
+    else:
+        square = centred @ centred.T
+        hat = np.linalg.solve(square + ridge * np.eye(count), square)
+        predicted, own = hat @ posed, np.diag(hat)
+    left_out = (1.0 - own - 1.0 / count)[:, None]
+    missed = np.square((posed - predicted - posed.mean(axis=0)) / left_out).mean(axis=0)
     whole = posed.var(axis=0) * (count / (count - 1)) ** 2  # likewise of the others' mean
     twins = counterparts(names)
     missed, whole, usual = (values + values[twins] for values in (missed, whole, variance))

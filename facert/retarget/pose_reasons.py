@@ -30,6 +30,8 @@ JUMP = 0.35
 """A pose jumps that leaves its neighbours by this share of the controls' ranges, RMS."""
 JUMPS = (3.0, 60.0)
 """Jumps a minute: to look at, and bad."""
+SOME = 2**12
+"""Posed frames, of very many, that show what deviation is usual."""
 RESTING = 0.25
 """An end of a range that is nearer to the usual pose than this share of it is one of rest."""
 REACHED = 1e-6
@@ -145,7 +147,9 @@ def usual_std(model: TrainedModel, ranges: FloatArray) -> float:
     """Standard deviation in posed frames, relative to the controls' ranges (P,)."""
     if model.labelled is None or not len(model.labelled):
         return 0.0
-    std = model.method.predict(model.source_units.apply(model.labelled)).std
+    some = np.linspace(0, len(model.labelled) - 1, min(len(model.labelled), SOME)).round()
+    posed = model.labelled[some.astype(np.int64)]  # each is compared with all
+    std = model.method.predict(model.source_units.apply(posed)).std
     if std is None:
         return 0.0
     return float(np.median(relative_to(ranges, std * model.target_units.scale)))

@@ -1,6 +1,7 @@
 import json
 import pickle
 import struct
+import tracemalloc
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -234,3 +235,22 @@ def test_a_file_of_another_kind_or_a_newer_version_is_refused(path):
 
 def test_a_file_that_is_not_there_is_named(path):
     refused(path, "expected")
+
+
+@pytest.mark.parametrize("places", [((0, 8), (0, 8)), ((8, 16), (8, 16)), ((0, 16), (16, 16))])
+def test_arrays_that_overlap_or_leave_gaps_are_refused(path, places):
+    array = {"dtype": "F64", "shape": [1]}
+    header = {"__metadata__": {"facert": json.dumps(METADATA)}}
+    header |= {name: array | {"data_offsets": at} for name, at in zip("ab", places, strict=True)}
+    text = json.dumps(header).encode()
+    write_header(path, text + bytes(16), len(text))
+    refused(path, "expected data_offsets")
+
+
+def test_arrays_are_in_memory_once(path):
+    write_tensors(path, {"a": np.zeros(500_000), "b": np.zeros(500_000)})
+    tracemalloc.start()
+    read_tensors(path, "facert-model")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.2 * path.stat().st_size

@@ -195,3 +195,18 @@ def test_residuals_are_the_same_by_the_smaller_side():
     unexplained(np.ones((3, 4000)), rng.normal(size=(4, 4000)))
     assert tracemalloc.get_traced_memory()[1] < 5 << 20
     tracemalloc.stop()
+
+
+def test_what_matters_of_very_many_poses_takes_no_matrix_of_their_square():
+    rng = np.random.default_rng(4)
+    posed, poses, names = rng.normal(size=(6, 3)), rng.normal(size=(6, 8)), ("a", "b", "c")
+    wide = relevance(posed, poses, np.ones(3), names)
+    centred = poses - poses.mean(axis=0)
+    narrow = centred @ np.linalg.svd(centred, full_matrices=False)[2][:5].T
+    np.testing.assert_allclose(relevance(posed, narrow, np.ones(3), names), wide, atol=1e-9)
+    many = rng.normal(size=(20_000, 3))
+    tracemalloc.start()
+    relevance(many, many[:, :2], np.ones(3), names)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 20 * many.nbytes
