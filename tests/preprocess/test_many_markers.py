@@ -11,7 +11,6 @@ from facert.data.memory import VARIABLE
 from facert.data.take import Source
 from facert.models.gaussian import Gaussian, fill_gaps
 from facert.preprocess.faults import find_faults
-from facert.preprocess.faults.prediction import PART, TOGETHER, parts_of
 from facert.preprocess.head_motion import stable_markers
 
 MEBIBYTE = 1 << 20
@@ -40,14 +39,6 @@ def test_faults_among_many_markers_are_found_by_their_neighbours(
     assert found.swapped[10:18, [57, 77]].all()
     assert found.strayed[26:, 333].all()
     assert found.any.sum() <= 1 + 16 + 15 + 2
-
-
-def test_parts_hold_each_marker_once_and_lie_together(scan: np.ndarray) -> None:
-    parts = parts_of(scan)
-    assert max(map(len, parts)) <= PART
-    np.testing.assert_array_equal(np.sort(np.concatenate(parts)), np.arange(400))
-    assert all(np.ptp(scan[0, part], axis=0).max() < 10 for part in parts)
-    assert [len(part) for part in parts_of(scan[:, :TOGETHER])] == [TOGETHER]
 
 
 def test_stable_markers_of_a_scan_are_sought_among_some(scan: np.ndarray) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.blocks import blocks, spread
 from facert.preprocess.faults.quantiles import median, quantile
 from facert.preprocess.faults.runs import numbered, whole_runs
 
@@ -33,6 +34,9 @@ WRITTEN = 2
 """So many such weights are looked for on either side."""
 VARIED = 10
 """The others have at least so many values: a weight of two values may be a switch."""
+LOOKED_AT, MANY = 600, 1_000_000
+"""Of more markers, so many tell where the middle is; and, of very many positions, those of as many
+frames how far markers usually are from it."""
 USUAL, MOST = 0.75, 0.98
 """Quantiles of a column of weights, and of columns in general."""
 
@@ -45,18 +49,28 @@ def absurd_positions(markers: FloatArray) -> BoolArray:
     markers : array, shape (T, M, 3)
         NaN: not observed.
     """
-    centre = median(markers.transpose(0, 2, 1))[:, None]
-    away = np.abs(np.nan_to_num(markers - centre))
-    farthest = away.max(axis=2)
+    frames, count = markers.shape[:2]
+    some = spread(count, LOOKED_AT)
+    centre = median(markers[:, some].transpose(0, 2, 1))[:, None]
+    farthest = np.empty((frames, count))
+    for rows in blocks(frames, 3 * count):
+        away = np.abs(markers[rows] - centre[rows])
+        farthest[rows] = np.maximum(np.maximum(away[:, :, 0], away[:, :, 1]), away[:, :, 2])
+    hidden = np.isnan(farthest)
+    np.nan_to_num(farthest, copy=False)
     if not farthest.any():
         return np.zeros(farthest.shape, dtype=np.bool_)
-    usual = float(np.median(farthest[farthest > 0.0]))
-    far = away > AWAY * usual
-    highest = np.where(far, markers, -np.inf).max(axis=0)
-    same = highest == np.where(far, markers, np.inf).min(axis=0)
-    at_centre = (farthest == 0.0) & ~np.isnan(markers[:, :, 0])
-    collapsed = at_centre & (2 * at_centre.sum(axis=1, keepdims=True) > markers.shape[1])
-    return np.asarray(collapsed | (farthest > NOWHERE * usual) | (far & same).any(axis=2))
+    looked_at = farthest[spread(frames, LOOKED_AT)][:, some] if farthest.size > MANY else farthest
+    usual = float(np.median(looked_at[looked_at > 0.0]))
+    result = np.asarray(farthest > NOWHERE * usual)
+    suspect = np.flatnonzero((farthest > AWAY * usual).any(axis=0))
+    positions = markers[:, suspect]
+    far = np.nan_to_num(np.abs(positions - centre)) > AWAY * usual
+    highest = np.where(far, positions, -np.inf).max(axis=0)
+    same = highest == np.where(far, positions, np.inf).min(axis=0)
+    result[:, suspect] |= (far & same).any(axis=2)
+    at_centre = (farthest == 0.0) & ~hidden
+    return np.asarray(result | (at_centre & (2 * at_centre.sum(axis=1, keepdims=True) > count)))
 
 
 def absurd_weights(weights: FloatArray) -> BoolArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.blocks import blocks
 
 UNLIKELY = 1e-5
 """A run of repeats whose chance is less than this is a held value."""
@@ -30,7 +31,9 @@ def held_values(markers: FloatArray) -> BoolArray:
     """
     frames = len(markers)
     steps = np.full(markers.shape[:2], np.nan)
-    steps[1:] = np.abs(np.diff(markers, axis=0)).max(axis=2)
+    for rows in blocks(frames - 1, markers[0].size):
+        step = np.abs(markers[1:][rows] - markers[:-1][rows])
+        steps[1:][rows] = np.maximum(np.maximum(step[:, :, 0], step[:, :, 1]), step[:, :, 2])
     both, repeats = ~np.isnan(steps), steps == 0.0
     moved = both & ~repeats
     if not moved.any() or not repeats.any():

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from facert.data.arrays import LARGEST as SENSIBLE
 from facert.data.arrays import FloatArray, IntArray, require_bounded
 from facert.data.take import Source, Take
 from facert.preprocess.cache import keep_last
@@ -48,15 +49,22 @@ def find_faults(source: Source, posed: IntArray | None = None) -> Faults:
     InputError
         When most of the source is so large that nothing can be computed with it.
     """
-    usual = float(np.nanmedian(np.abs(source.values)))
-    require_bounded(np.array([usual]), f"/source/{source.kind}")
+    if _largest(source) > SENSIBLE:
+        usual = float(np.nanmedian(np.abs(source.values)))
+        require_bounded(np.array([usual]), f"/source/{source.kind}")
     values = _computable(source)
     return _of_markers(values) if source.kind == "markers" else _of_weights(values, posed)
 
 
+def _largest(source: Source) -> float:
+    values = source.values
+    return max(float(np.fmax.reduce(values, None)), -float(np.fmin.reduce(values, None)))
+
+
 def _computable(source: Source) -> FloatArray:
     """The values of a source, those whose squares are no numbers replaced by `LARGEST`."""
-    return np.clip(source.values, -LARGEST, LARGEST)
+    values = source.values
+    return np.clip(values, -LARGEST, LARGEST) if _largest(source) > LARGEST else values
 
 
 def without_faults(take: Take) -> Take:
@@ -91,8 +99,9 @@ def _of_weights(weights: FloatArray, posed: IntArray | None) -> Faults:
 
 def _of_markers(markers: FloatArray) -> Faults:
     """Faults of markers (T, M, 3)."""
-    zero = np.asarray((markers == 0.0).all(axis=2))
-    seen = np.where(zero[:, :, None], np.nan, markers)
+    none = markers == 0.0
+    zero, seen = none[:, :, 0] & none[:, :, 1] & none[:, :, 2], markers.copy()
+    seen[zero] = np.nan
     absurd = absurd_positions(seen)
     seen[absurd] = np.nan
     frozen = held_values(seen)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
-from facert.preprocess.faults.prediction import off_in_space
+from facert.data.blocks import blocks, spread
+from facert.data.normalisation import deviation
+from facert.preprocess.faults.prediction import ALL, expected_of, lengths, some_frames
 from facert.preprocess.motion.series import interpolated
 
 ORDINARY, FAR = 0.9, 3.0
@@ -26,36 +28,60 @@ def single_spikes(markers: FloatArray) -> BoolArray:
     markers : array, shape (T, M, 3)
         NaN: not observed.
     """
-    seen = ~np.isnan(markers[:, :, 0])
-    spikes = np.zeros_like(seen)
-    ever = seen.any(axis=0)
+    hidden = np.isnan(markers[:, :, 0])
+    ever = np.asarray(~hidden.all(axis=0))
+    spikes = np.zeros_like(hidden)
     if len(markers) < 3 or ever.sum() < FEWEST:
         return spikes
+    if not ever.all():
+        spikes[:, ever] = single_spikes(np.ascontiguousarray(markers[:, ever]))
+        return spikes
+    left = markers
     for _ in range(ROUNDS):
-        left = np.where(spikes[:, ever, None], np.nan, markers[:, ever])
-        largest = float(np.nanstd(left, axis=0).max())
+        largest = _largest_deviation(left)
         if largest == 0.0:
             break
+        counted = ~(hidden | spikes)
         in_time = _off_in_time(left)
-        off = np.minimum(in_time, off_in_space(left))
-        counted = ~np.isnan(left[:, :, 0])
-        far = FAR * float(np.quantile(off[counted], ORDINARY)) + SMALL * largest
+        off = np.minimum(in_time, _off_in_space(left))
+        far = FAR * _ordinary(off, counted) + SMALL * largest
         found = counted & (off > far) & _peaks(in_time)
         if not found.any():
             break
-        spikes[:, ever] |= found
+        spikes |= found
+        left = left.copy()
+        left[found] = np.nan
     return spikes
+
+
+def _ordinary(off: FloatArray, counted: BoolArray) -> float:
+    """The distance that `ORDINARY` positions (T, M), of very many some, are not farther off."""
+    some = spread(len(off), max(ALL // off.shape[1], 1))
+    return float(np.quantile(off[some][counted[some]], ORDINARY))
+
+
+def _off_in_space(markers: FloatArray) -> FloatArray:
+    """Distance of each position to its prediction by the rest of its frame, (T, M)."""
+    hidden = np.isnan(markers[:, :, 0])
+    return expected_of(markers[some_frames(hidden)]).off(markers, np.zeros_like(hidden))
+
+
+def _largest_deviation(markers: FloatArray) -> float:
+    X = markers.reshape(len(markers), -1)
+    return max(float(deviation(X[:, own]).max()) for own in blocks(X.shape[1], len(X)))
 
 
 def _off_in_time(markers: FloatArray) -> FloatArray:
     """Distance of each position to a line, or a cubic, through those around, (T, M)."""
-    frames = len(markers)
-    X = interpolated(markers.reshape(frames, -1), np.arange(frames, dtype=np.float64))
-    x = _continued(X.reshape(markers.shape))
-    beside, beyond = x[1:-3] + x[3:-1], x[:-4] + x[4:]
-    here = x[2:-2]
-    off = np.stack([here - beside / 2.0, here - (4.0 * beside - beyond) / 6.0])
-    return np.asarray(np.linalg.norm(off, axis=3).min(axis=0))
+    frames, count = markers.shape[:2]
+    off, time = np.empty((frames, count)), np.arange(frames, dtype=np.float64)
+    for some in blocks(count, 3 * frames):
+        X = interpolated(markers[:, some].reshape(frames, -1), time)
+        x = _continued(X.reshape(frames, -1, 3))
+        beside, beyond, here = x[1:-3] + x[3:-1], x[:-4] + x[4:], x[2:-2]
+        line, cubic = here - beside / 2.0, here - (4.0 * beside - beyond) / 6.0
+        off[:, some] = np.minimum(lengths(line), lengths(cubic))
+    return off
 
 
 def _continued(x: FloatArray) -> FloatArray:

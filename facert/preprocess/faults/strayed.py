@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray
+from facert.data.blocks import spread
 from facert.mesh.rigid import align
-from facert.preprocess.faults.prediction import Expected, parts_of, spread_rows
+from facert.preprocess.faults.prediction import Expected, expected_of, some_frames
 from facert.preprocess.faults.quantiles import median, quantile
 from facert.preprocess.faults.runs import whole_runs
 
@@ -48,8 +49,10 @@ MOST = 0.8
 """A marker is not suspect in more than this share of the frames."""
 OTHERS = 40
 """Markers that distances are taken to, at most."""
-AT_ONCE = 4_000_000
-"""Distances that are in memory at once."""
+DISTANCES, AT_ONCE = 8_000_000, 1_000_000
+"""Distances that are taken, of very many markers, and those that are in memory at once."""
+MOST_ALIGNED = 600
+"""Markers that frames are aligned by, at most."""
 PLACED = 2
 """How often the shape is estimated anew."""
 
@@ -94,25 +97,20 @@ def far_from_expected(markers: FloatArray) -> BoolArray:
     markers : array, shape (T, M, 3)
         NaN: not observed.
     """
-    strays = np.zeros(markers.shape[:2], dtype=np.bool_)
-    ever = ~np.isnan(markers[:, :, 0]).all(axis=0)
+    hidden = np.isnan(markers[:, :, 0])
+    strays, ever = np.zeros_like(hidden), np.asarray(~hidden.all(axis=0))
     if len(markers) < 3 or ever.sum() < FEWEST:
         return strays
-    known = markers[:, ever]
-    some = known[_rows(known)]
+    if not ever.all():
+        strays[:, ever] = far_from_expected(np.ascontiguousarray(markers[:, ever]))
+        return strays
+    some = markers[some_frames(hidden, FIT)]
     size, change = _distances(some)
     if size > 0.0:
         expectation = _expectation(some, size, change)
-        found = expectation.strays(known, strays[:, ever])
-        strays[:, ever] = expectation.unsteady(known, found) if found.any() else found
+        found = expectation.strays(markers, strays)
+        return expectation.unsteady(markers, found) if found.any() else found
     return strays
-
-
-def _rows(markers: FloatArray) -> IntArray:
-    """Frames to fit to: some, evenly spread, or all if a marker would be lost."""
-    some = spread_rows(len(markers), FIT)
-    lost = np.isnan(markers[some, :, 0]).all(axis=0).any()
-    return np.arange(len(markers)) if lost else some
 
 
 def _expectation(markers: FloatArray, size: float, change: FloatArray) -> _Expectation:
@@ -120,10 +118,10 @@ def _expectation(markers: FloatArray, size: float, change: FloatArray) -> _Expec
     hidden = np.isnan(markers[:, :, 0])
     away = _away_from_place(markers, ~hidden & ~_strange(change, size))
     least = max(FAR * size, FARTHER * float(np.nanquantile(away, ORDINARY)))
-    suspect, parts = _strange(away, size), parts_of(markers)
+    suspect = _strange(away, size)
     for _ in range(ROUNDS):
         kept = np.where(suspect[:, :, None], np.nan, markers)
-        expected = Expected.of(kept, parts, NOISE * size)
+        expected = expected_of(kept, NOISE * size)
         away = expected.off(markers, suspect)
         usual = median(np.where(suspect | hidden, np.nan, away).T)
         expectation = _Expectation(expected, size, np.maximum(least, TIMES * usual))
@@ -139,7 +137,8 @@ def _distances(markers: FloatArray) -> tuple[float, FloatArray]:
 
     Both are medians over the other markers, which no head motion changes.
     """
-    others = markers[:, spread_rows(markers.shape[1], OTHERS)]
+    most = max(DISTANCES // (markers.shape[0] * markers.shape[1]), FEWEST)
+    others = markers[:, spread(markers.shape[1], min(most, OTHERS))]
     parts = -(-markers.shape[1] * others.shape[0] * others.shape[1] // AT_ONCE)
     found = [_changes(part, others) for part in np.array_split(markers, parts, axis=1)]
     usual = np.concatenate([one for one, _ in found])
@@ -160,7 +159,8 @@ def _away_from_place(markers: FloatArray, kept: BoolArray) -> FloatArray:
     """Distances of frames (n, M, 3) from the usual places in the face, by what is kept (n, M)."""
     shape = markers[kept.sum(axis=1).argmax()]
     for _ in range(PLACED):
-        known = ~np.isnan(shape[:, 0])
+        known = np.flatnonzero(~np.isnan(shape[:, 0]))
+        known = known[spread(len(known), MOST_ALIGNED)]
         motion = align(shape[known], markers[:, known], kept[:, known].astype(np.float64))
         placed = motion.undo(markers)
         shape = median(placed.transpose(1, 2, 0))

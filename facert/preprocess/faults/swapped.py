@@ -9,12 +9,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facert.data.arrays import BoolArray, FloatArray, IntArray
-from facert.preprocess.faults.prediction import predicted
+from facert.data.blocks import blocks, spread
+from facert.preprocess.faults.prediction import lengths, predicted
+from facert.preprocess.faults.quantiles import median
 
 AT_ONCE = 4_000_000
 """Distances, or entries of pairs and frames, that are in memory at once."""
-MANY = 200
-"""Markers, beyond which a tree of them finds the nearest sooner than all distances do."""
+MANY, AROUND = 200, 8
+"""Of more markers, only the nearest so many are looked at: farther away, a marker has strayed."""
 MOST = 0.5
 """Where more of what was seen is suspect, markers move too far to be separated by it."""
 
@@ -90,43 +92,78 @@ def _crossings(markers: FloatArray) -> _Crossings:
 
     One of the two may be hidden just then.
     """
-    now = markers[1:]
-    came_from = _nearest(now, _last_seen(markers)[:-1])
-    back = np.take_along_axis(came_from, came_from, axis=1)
-    own, seen = np.arange(markers.shape[1]), ~np.isnan(now[:, :, 0])
-    hidden = ~np.take_along_axis(seen, came_from, axis=1)
-    frames, one = np.nonzero(seen & (came_from != own) & (hidden | (back == own)))
-    pairs = np.sort(np.stack([one, came_from[frames, one]], axis=1), axis=1)
+    count = markers.shape[1]
+    frame, one, other = _moved(markers)
+    number = (frame * count + one) * count + other
+    back = np.isin(number, (frame * count + other) * count + one)
+    crossed = back | np.isnan(markers[frame, other, 0])
+    pairs = np.sort(np.stack([one[crossed], other[crossed]], axis=1), axis=1)
     different, pair = np.unique(pairs, axis=0, return_inverse=True)
-    both = np.unique(np.stack([pair.ravel(), frames + 1], axis=1), axis=0)
+    both = np.unique(np.stack([pair.ravel(), frame[crossed]], axis=1), axis=0)
     return _Crossings(different, both[:, 0], both[:, 1])
 
 
-def _nearest(now: FloatArray, before: FloatArray) -> IntArray:
-    """Index of the marker last seen nearest to each marker in each frame, (T, M)."""
-    if now.shape[1] > MANY:
-        return np.stack([_nearest_by_tree(*one) for one in zip(now, before, strict=True)])
-    result = np.empty(now.shape[:2], dtype=np.int64)
-    some = max(AT_ONCE // now.shape[1] ** 2, 1)
-    for start in range(0, len(now), some):
-        here, there = now[start : start + some], before[start : start + some]
-        squares = (there**2).sum(axis=2)[:, None, :] - 2.0 * here @ there.transpose(0, 2, 1)
-        nearest = np.where(np.isnan(squares), np.inf, squares).argmin(axis=2)
-        result[start : start + some] = nearest
-    return result
+def _moved(markers: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Frames in which a marker comes nearest to where another was, that marker, and the other."""
+    nearest = _Neighbours.of(markers).nearest if markers.shape[1] > MANY else _nearest
+    found, last = [np.empty((3, 0), dtype=np.int64)], markers[0]
+    for rows in blocks(len(markers) - 1, max(markers.shape[1], MANY) ** 2 // 8, AT_ONCE):
+        now = markers[1:][rows]
+        seen = _last_seen(np.concatenate([last[None], now]))
+        frame, one, other = nearest(now, seen[:-1])
+        found.append(np.stack([frame + rows.start + 1, one, other]))
+        last = seen[-1]
+    frame, one, other = np.concatenate(found, axis=1)
+    return frame, one, other
 
 
-def _nearest_by_tree(now: FloatArray, before: FloatArray) -> IntArray:
-    """The same in one frame, (M,), of many markers; 0 for what was not seen."""
-    seen, known = ~np.isnan(now[:, 0]), np.flatnonzero(~np.isnan(before[:, 0]))
-    result = np.zeros(len(now), dtype=np.int64)
-    if len(known):
-        result[seen] = known[cKDTree(before[known]).query(now[seen])[1]]
-    return result
+def _nearest(now: FloatArray, before: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """The same for a few frames and those before, (T, M, 3) each, by all distances."""
+    squares = (before**2).sum(axis=2)[:, None, :] - 2.0 * now @ before.transpose(0, 2, 1)
+    other = np.where(np.isnan(squares), np.inf, squares).argmin(axis=2)
+    own, seen = np.arange(now.shape[1]), ~np.isnan(now[:, :, 0])
+    frame, one = np.nonzero(seen & (other != own))
+    return frame, one, other[frame, one]
+
+
+@dataclass(frozen=True, eq=False)
+class _Neighbours:
+    """Each of many markers with those that usually lie around it: others are not looked at."""
+
+    around: IntArray  # (M, K)
+    spacing: FloatArray  # (M,): The distance to the nearest
+
+    @classmethod
+    def of(cls, markers: FloatArray) -> _Neighbours:
+        """The neighbours in a frame (T, M, 3) that shows most markers."""
+        shape = markers[(~np.isnan(markers[:, :, 0])).sum(axis=1).argmax()]
+        known = np.flatnonzero(~np.isnan(shape[:, 0]))
+        found = cKDTree(shape[known]).query(shape[known], min(AROUND + 1, len(known)))
+        distance, near = np.asarray(found[0]), np.asarray(found[1])
+        around = np.tile(np.arange(len(shape))[:, None], (1, near.shape[1]))
+        around[known], spacing = known[near], np.full(len(shape), np.inf)
+        spacing[known] = distance[:, 1]
+        return cls(around, spacing)
+
+    def nearest(self, now: FloatArray, before: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+        """As `_nearest`, of markers that move, relative to all, by half the distance to another."""
+        some = spread(now.shape[1], MANY)
+        away = now - before
+        away -= median(away[:, some].transpose(0, 2, 1))[:, None]
+        frame, one = np.nonzero(lengths(away) > self.spacing / 2.0)
+        around = self.around[one]
+        there = before[frame[:, None], around] - now[frame, one][:, None]
+        squares = np.nan_to_num(np.einsum("nki,nki->nk", there, there), nan=np.inf)
+        other = around[np.arange(len(one)), squares.argmin(axis=1)]
+        moved = other != one
+        return frame[moved], one[moved], other[moved]
 
 
 def _last_seen(markers: FloatArray) -> FloatArray:
     """The last position seen of each marker at each frame, (T, M, 3); NaN before the first."""
-    seen = ~np.isnan(markers[:, :, 0])
-    last = np.maximum.accumulate(np.where(seen, np.arange(len(markers))[:, None], 0), axis=0)
+    hidden = np.isnan(markers[:, :, 0])
+    if not hidden.any():
+        return markers
+    last = np.where(hidden, 0, np.arange(len(markers))[:, None])
+    last = np.maximum.accumulate(last, axis=0)
     return np.take_along_axis(markers, last[:, :, None], axis=0)

@@ -42,7 +42,14 @@ class MotionFactors(ArrayGroup):
     noise: Annotated[FloatArray, "x"]  # (d,): Variance of e
 
     @classmethod
-    def learned(cls, X: FloatArray, filled: FloatArray, sigma: float, count: int) -> MotionFactors:
+    def learned(
+        cls,
+        X: FloatArray,
+        filled: FloatArray,
+        sigma: float,
+        count: int,
+        iterations: int = ITERATIONS,
+    ) -> MotionFactors:
         """The factors of frames with gaps.
 
         Parameters
@@ -55,8 +62,10 @@ class MotionFactors(ArrayGroup):
             Standard deviation of the capture noise.
         count : int
             q, at most.
+        iterations : int
+            Of the search; the least noise falls from the first to the last of them.
         """
-        schedule = np.geomspace(max(COARSE, sigma), max(FINE, sigma), ITERATIONS)
+        schedule = np.geomspace(max(COARSE, sigma), max(FINE, sigma), iterations)
         factors = cls._principal(filled, count, schedule[0])
         some = _Shown.by(X[:, part_of(X.shape[1])])
         for least in schedule[:-1]:
