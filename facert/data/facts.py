@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.overview import TakeOverview
 from facert.data.rate import frames_at
 from facert.data.resampling import EVEN, PAUSE
 from facert.data.rig import Mesh, MeshSequence, Rig
@@ -21,7 +22,7 @@ MANY = 5
 """How many of the worst channels, or of the first labels, are named."""
 
 
-def facts_of(found: Take | Rig | MeshSequence) -> dict[str, Any]:
+def facts_of(found: Take | TakeOverview | Rig | MeshSequence) -> dict[str, Any]:
     """The facts by name, plain numbers, text, tuples and dictionaries: what JSON can hold.
 
     ``constant`` channels never vary, ``still`` shapes move nothing; ``extents`` are width, height
@@ -29,11 +30,14 @@ def facts_of(found: Take | Rig | MeshSequence) -> dict[str, Any]:
     and a half nominal frames, of which ``longest_gap`` has the seconds; frames that are
     ``evenly_spaced`` lie on the grid of their rate, whatever the gaps; ``zeros`` counts marker
     positions that are exactly (0, 0, 0), which is how some programs write a lost marker, and
-    ``zero_rows`` frames whose weights are all exactly 0: no face to others, or one at rest.
+    ``zero_rows`` frames whose weights are all exactly 0: no face to others, or one at rest. Of an
+    overview, what is said of the source is that of the frames ``looked_at``.
     """
     if isinstance(found, MeshSequence):
         return _of_sequence(found)
-    return _of_rig(found) if isinstance(found, Rig) else _of_take(found)
+    if isinstance(found, Rig):
+        return _of_rig(found)
+    return _of_take(TakeOverview.of(found) if isinstance(found, Take) else found)
 
 
 def _of_sequence(sequence: MeshSequence) -> dict[str, Any]:
@@ -47,7 +51,7 @@ def _of_sequence(sequence: MeshSequence) -> dict[str, Any]:
     }
 
 
-def _of_take(take: Take) -> dict[str, Any]:
+def _of_take(take: TakeOverview) -> dict[str, Any]:
     return {
         "kind": "take",
         **_clock(take),
@@ -56,17 +60,23 @@ def _of_take(take: Take) -> dict[str, Any]:
         "up_axis": take.up_axis,
         "start_timecode": take.start_timecode,
         "created_by": take.created_by,
-        "source": _of_source(take.source),
+        "source": _looked_at(take) | _of_source(take.source),
         "target": _of_target(take),
     }
 
 
-def _clock(found: Take | MeshSequence) -> dict[str, Any]:
+def _looked_at(take: TakeOverview) -> dict[str, Any]:
+    """How many frames the source is of, where these are not all."""
+    count = len(take.source.values)
+    return {} if count == len(take) else {"looked_at": f"{count} of {len(take)} frames"}
+
+
+def _clock(found: TakeOverview | MeshSequence) -> dict[str, Any]:
     seconds = float(found.time[-1] - found.time[0])
     return {"frames": len(found), "seconds": seconds, "fps": float(found.fps)}
 
 
-def _spacing(take: Take) -> dict[str, Any]:
+def _spacing(take: TakeOverview) -> dict[str, Any]:
     """How the frames lie in time: evenly, but for gaps, or not."""
     steps = np.diff(take.time)
     gaps = steps[steps > PAUSE / take.fps]
@@ -105,7 +115,7 @@ def _of_source(source: Source) -> dict[str, Any]:
     }
 
 
-def _of_target(take: Take) -> dict[str, Any] | None:
+def _of_target(take: TakeOverview) -> dict[str, Any] | None:
     if take.controls is None:
         return None
     names, limits = take.controls.names, take.controls.limits
@@ -118,8 +128,8 @@ def _of_target(take: Take) -> dict[str, Any] | None:
         "active": int(active.sum()),
         "constant": _pick(names, ~active),
         "limits": None if limits is None else tuple(map(_ends, limits.tolist())),
-        "deviations": take.std is not None,
-        "corrections": None if take.corrections is None else len(take.corrections.frames),
+        "deviations": take.predicted,
+        "corrections": take.corrected,
         "animation": 0 if take.animation is None else len(take.animation),
     }
 

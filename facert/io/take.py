@@ -75,7 +75,7 @@ def read_take(path: Path) -> Take:
         return Take(
             time=file.numbers("/time"),
             source=_read_source(file),
-            controls=_read_controls(file),
+            controls=read_controls(file),
             params=params,
             std=_frozen(file, "/target/std"),
             animation=_frozen(file, "/animation/params"),
@@ -208,7 +208,8 @@ def _frozen(file: GuardedFile, path: str) -> FloatArray | None:
     return None if found is None else frozen(found)
 
 
-def _read_controls(file: GuardedFile) -> Controls | None:
+def read_controls(file: GuardedFile) -> Controls | None:
+    """Read the character's controls, if there are any."""
     if "/target/names" not in file:
         return None
     return Controls(file.names("/target/names"), file.optional("/target/limits"))

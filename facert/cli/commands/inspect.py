@@ -47,10 +47,13 @@ def _facts(path: Path, target: str | None, shapes: str | None) -> dict[str, Any]
     from facert.io.formats import nodes_of, read_any, targets_of
     from facert.io.mesh_sequence import holds_mesh_sequence, open_mesh_sequence
     from facert.io.npz import NO_TARGET
+    from facert.io.take_overview import overview
 
     if holds_mesh_sequence(path):
         with open_mesh_sequence(path) as sequence:
             return facts_of(sequence)
+    if target is None and shapes is None and (looked := overview(path)) is not None:
+        return facts_of(looked)
     targets = targets_of(path) if target is None else {}
     found = read_any(path, target=NO_TARGET if targets else target, shapes=shapes, fps=None)
     facts = facts_of(found)
