@@ -43,6 +43,36 @@ except SystemExit as stop:
     assert run(code).endswith("exit 0 []\n")
 
 
+def test_what_needs_no_torch_never_imports_it(make_take, tmp_path):
+    take, model = tmp_path / "take.h5", tmp_path / "model.safetensors"
+    facert.write_take(make_take(), take)
+    facert.train(make_take(), facert.Settings(method="ridge")).save(model)
+    commands = {
+        "retarget": (take, tmp_path / "made.h5", "--model", model),
+        "inspect": (model,),
+        "clean": (take, tmp_path / "clean.h5"),
+        "convert": (take, tmp_path / "take.csv"),
+        "eval": (take, "--methods", "ridge", "--labels", 4, "--repeats", 1),
+    }
+    code = f"""
+import sys
+from facert.cli.app import main
+from facert.methods.registry import REGISTRY, method_class
+for words in {[[name, *map(str, words)] for name, words in commands.items()]}:
+    sys.argv = ["facert", *words]
+    try:
+        main()
+    except SystemExit as stop:
+        assert not stop.code, (words, stop.code)
+    assert "torch" not in sys.modules, words
+for name in REGISTRY.keys() - {{"ssgplvm", "sgplvm"}}:
+    method_class(name)
+    assert "torch" not in sys.modules, name
+print("without torch")
+"""
+    assert run(code).endswith("without torch\n")
+
+
 def test_the_example_of_the_package_works(make_take, tmp_path):
     facert.write_take(make_take(), tmp_path / "take.h5")
     facert.write_take(make_take(posed=0, animation=0, seed=1), tmp_path / "new.h5")

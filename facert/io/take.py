@@ -43,7 +43,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from facert.data.arrays import FloatArray, frozen, require_shape
+from facert.data.arrays import BoolArray, FloatArray, frozen, require_shape
 from facert.data.take import Controls, Corrections, Source, Take
 from facert.errors import InputError
 from facert.io.guarded import parsing
@@ -195,11 +195,22 @@ def _read_source(file: GuardedFile, root: str = "/source") -> Source:
     values = file.numbers(path)
     layout = ("T", "M", "3") if kinds[0] == "markers" else ("T", "D")
     require_shape(values.shape, layout, path, "Write one row a frame.")
-    if f"{root}/valid" in file:  # False: not observed
-        valid, fix = file.flags(f"{root}/valid"), "Give one flag a frame and marker or weight."
-        require_shape(valid.shape, values.shape[:2], f"{root}/valid", fix)
+    valid = read_valid(file, values.shape, root)
+    if valid is not None:
         values[~valid] = np.nan
     return Source(frozen(values), file.names(f"{root}/names"))
+
+
+def read_valid(
+    file: GuardedFile, shape: tuple[int, ...], root: str = "/source"
+) -> BoolArray | None:
+    """The flags of a source of some shape, False for what was not observed, where there are any."""
+    path = f"{root}/valid"
+    if path not in file:
+        return None
+    valid = file.flags(path)
+    require_shape(valid.shape, shape[:2], path, "Give one flag a frame and marker or weight.")
+    return valid
 
 
 def _frozen(file: GuardedFile, path: str) -> FloatArray | None:

@@ -15,7 +15,7 @@ from facert.data.overview import TakeOverview
 from facert.data.take import Source
 from facert.io.hdf5 import TAKE_FORMAT, GuardedFile, open_guarded, stated_format
 from facert.io.registry import OWN_ENDINGS
-from facert.io.take import VERSION, read_controls
+from facert.io.take import VERSION, read_controls, read_valid
 
 RUNS, RUN = 4, 2048
 """Frames that are looked at: so many runs of so many."""
@@ -57,12 +57,17 @@ def _source(file: GuardedFile) -> str:
 
 
 def _some_frames(file: GuardedFile) -> FloatArray | None:
-    """The source of some frames; None where that is not much less than all, or flags hide some."""
+    """The source of some frames; None where that is not much less than all."""
     path = _source(file)
-    if path not in file or "/source/valid" in file:
+    if path not in file:
         return None
     rows = file.rows(path)
     if rows.shape[0] < 2 * RUNS * RUN:
         return None
-    starts = np.linspace(0, rows.shape[0] - RUN, RUNS).astype(int)
-    return np.concatenate([rows.read(np.arange(start, start + RUN)) for start in starts])
+    starts = np.linspace(0, rows.shape[0] - RUN, RUNS).astype(np.int64)
+    runs = [np.arange(start, start + RUN) for start in starts]
+    values = np.concatenate([rows.read(run) for run in runs])
+    valid = read_valid(file, rows.shape)
+    if valid is not None:
+        values[~valid[np.concatenate(runs)]] = np.nan
+    return values
