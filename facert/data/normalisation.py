@@ -48,7 +48,10 @@ class Normalisation:
         scale = max(float(deviation(part).max()) for part in parts) if moves else 0.0
         if not scale > STILL * max(float(np.nanmax(high)), -float(np.nanmin(low))):
             expected, found = "values that change over the rows", "the same row throughout"
-            raise InputError(field, expected, found, "Check that the right data was exported.")
+            fix = "Check that the right data was exported."
+            if len(values) == 1:
+                found, fix = "one row alone", "Give a longer take, or several."
+            raise InputError(field, expected, found, fix)
         return cls(mean, scale)
 
     def seen_from(self, other: Normalisation) -> Normalisation:

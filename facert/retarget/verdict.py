@@ -13,6 +13,7 @@ import numpy as np
 
 from facert.data.arrays import FloatArray
 from facert.data.take import Take
+from facert.data.text import plural
 from facert.data.verdict import LEVELS, Reason, Verdict
 from facert.errors import InputError
 from facert.preprocess.motion.estimate import FEWEST
@@ -51,7 +52,7 @@ def judge(
         expected, found = "the controls of the model", "others"
         raise InputError("/target/names", expected, found, "Give the model that made the result.")
     if len(result) < FEWEST:  # shares of single frames mean nothing
-        return Verdict((), np.zeros(len(result)), result.time)
+        return _of_few(result)
     detect = options is None or options.detect
     of_source, unlike = source_reasons(take, result, model, detect)
     off = np.zeros(len(result), dtype=np.bool_)
@@ -60,6 +61,17 @@ def judge(
     of_poses, unsure = pose_reasons(result, model, off)
     reasons = sorted([*of_source, *of_poses], key=lambda reason: -LEVELS.index(reason.level))
     return Verdict(tuple(reasons), _anomaly(reasons, unlike, unsure), result.time)
+
+
+def _of_few(result: Take) -> Verdict:
+    """The verdict on a take that is too short for one: nobody said that it is good."""
+    text = f"{plural(len(result), 'frame')}, and {FEWEST} are needed to judge poses"
+    cure = "look at each of them, as facert view shows it"
+    return Verdict(
+        (Reason("short", "look at it", text, cure, np.arange(len(result))),),
+        np.ones(len(result)),
+        result.time,
+    )
 
 
 def _anomaly(

@@ -52,3 +52,9 @@ def test_rounding_is_no_motion():
     still = 100.0 + 1e-13 * np.random.default_rng(0).normal(size=(10, 3))
     with pytest.raises(InputError, match="the same row throughout"):
         Normalisation.of(still, "x")
+
+
+def test_a_row_alone_is_told_from_rows_that_are_all_the_same():
+    for rows, message in ((1, "one row alone. Give a longer take"), (3, "the same row throughout")):
+        with pytest.raises(InputError, match=message):
+            Normalisation.of(np.ones((rows, 4)), "/source")

@@ -204,3 +204,14 @@ def test_the_worst_frames_lie_apart():
     verdict = Verdict((reason,), anomaly, np.arange(100) / 10.0)
     assert verdict.worst(3).tolist() == [40, 80]
     assert verdict.level == "bad"
+
+
+@pytest.mark.parametrize("frames", [1, 2, 9])
+def test_a_take_too_short_to_judge_is_never_called_good(model, shot, frames):
+    short = replace(shot, time=shot.time[:frames], params=None, source=replace(
+        shot.source, values=shot.source.values[:frames]
+    ))  # fmt: skip
+    verdict = judged(model, replace(short, std=None))
+    assert verdict.level == "look at it"
+    assert where(the("short", verdict).frames, verdict.time).startswith("frame")
+    assert verdict.worst(1).tolist() == [0]
