@@ -38,7 +38,6 @@ from facert.methods.held_out import held_out
 from facert.methods.processes import Basis, FeatureProcess, ProcessBank
 from facert.methods.regression import Map, Regression, Variance
 from facert.methods.shrinkage import Shrinkage
-from facert.models.gp.hyperparameters import MOST_SEARCHED
 
 TOGETHER = 0.3  # ρ
 FAULTLESS = 1e-9  # least E, relative to the squared error of the worst expert
@@ -50,6 +49,8 @@ EXPERTS = (
 )
 # Poses without a frame that the factors are learned from: the time that it takes grows with them.
 MOST_POSES = 500
+# With more labels a fifth of them changes a kernel little, and folds keep that of all.
+FEW = 100
 UNBOUNDED = 1e9  # in normalised units: no limit, in a file of finite numbers
 
 
@@ -157,7 +158,7 @@ def cross_validated_poses(labelled: Labelled, unlabelled: Unlabelled, maps: Base
     """
     predicted = np.empty((3, *labelled.Y.shape))
     folds = ranked_folds(labelled.X)
-    if len(labelled.X) > MOST_SEARCHED:
+    if len(labelled.X) > FEW:
         return _with_their_kernels(labelled, unlabelled, maps, folds)
     for train, test in folds:
         rest, others = _without(labelled, unlabelled, train, test)

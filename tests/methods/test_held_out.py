@@ -60,12 +60,12 @@ def _many(monkeypatch):
 
 def test_cross_validation_with_shared_work_says_the_same(many, monkeypatch):
     expected = cross_validated_poses(*many)
-    monkeypatch.setattr(blend, "MOST_SEARCHED", 24)
+    monkeypatch.setattr(blend, "FEW", 24)
     np.testing.assert_allclose(cross_validated_poses(*many), expected, atol=1e-7)
 
 
 def test_no_kernel_is_searched_in_folds_of_many_labels(many, monkeypatch):
-    monkeypatch.setattr(blend, "MOST_SEARCHED", 24)
+    monkeypatch.setattr(blend, "FEW", 24)
     monkeypatch.setattr(FeatureProcess, "learn", None)
     cross_validated_poses(*many)
 
