@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from facert.data.arrays import FloatArray
-from facert.models.leading_directions import DENSE, narrowed
+from facert.models.leading_directions import DENSE, principal_variances
 from facert.settings import Settings
 
 # Normalised units. Below the first, source mapping begins to stick to the training latents (their
@@ -40,10 +40,10 @@ def expected_noise(X: FloatArray, latent_dim: int) -> float:
     float
         √λ_{q+1}, not below `LEAST` nor above `MOST`.
     """
-    X = narrowed(X[:: -(-len(X) // ENOUGH)]) if X.shape[1] > DENSE else X
-    deviations = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) / np.sqrt(len(X))
-    left_over = deviations[latent_dim] if latent_dim < len(deviations) else 0.0
-    return float(np.clip(left_over, LEAST, MOST))
+    X = X[:: -(-len(X) // ENOUGH)] if X.shape[1] > DENSE else X
+    variances = principal_variances(X) / max(X.shape[1] / DENSE, 1.0)  # as methods see it
+    left_over = variances[latent_dim] if latent_dim < len(variances) else 0.0
+    return float(np.clip(np.sqrt(left_over), LEAST, MOST))
 
 
 def with_noise(settings: Settings, X: FloatArray) -> Settings:

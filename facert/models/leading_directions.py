@@ -13,6 +13,7 @@ up to e; and costs by r instead of d.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -83,7 +84,11 @@ class LeadingDirections(ArrayGroup):
 
     def scores(self, X: FloatArray) -> FloatArray:
         """Vᵀ (x - x̄) of complete frames (T, d), (T, r)."""
-        return np.asarray(X @ self.basis - self.mean @ self.basis)
+        return np.asarray(X @ self.basis - self._mean_scores)
+
+    @cached_property
+    def _mean_scores(self) -> FloatArray:
+        return np.asarray(self.mean @ self.basis)
 
     def fill(self, X: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Replace every NaN by its conditional mean given the rest of its frame.
@@ -129,28 +134,26 @@ class LeadingDirections(ArrayGroup):
         return np.asarray(root[:, None] * np.linalg.inv(inner) * root)
 
 
-def narrowed(X: FloatArray) -> FloatArray:
-    """Frames (n, d) by their leading directions, (n, r), as if `DENSE` columns had shown them.
+def principal_variances(X: FloatArray) -> FloatArray:
+    """The variances of frames (n, d) along their principal directions, falling, (min(n, d),)."""
+    return np.maximum(np.linalg.eigvalsh(_products(X - X.mean(axis=0)))[::-1], 0.0) / len(X)
 
-    Frames of no more columns are returned as they are.
-    """
-    if X.shape[1] <= DENSE:
-        return X
-    found = LeadingDirections.learned(X)
-    return found.scores(X) / found.density
+
+def _products(centred: FloatArray) -> FloatArray:
+    """Products of centred frames (n, d) or of their columns, whichever are fewer."""
+    n, d = centred.shape
+    return np.asarray(centred @ centred.T if n <= d else centred.T @ centred)
 
 
 def _principal(centred: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     """The first variances, falling, and directions (d, count) of centred frames (n, d).
 
-    By the products of frames or of columns, whichever are fewer. Frames that span fewer directions
-    are given others at right angles to these, with no variance.
+    Frames that span fewer directions are given others at right angles to these, with no variance.
     """
     n, d = centred.shape
     few = min(n, d)
     first = max(few - count, 0)
-    products = centred @ centred.T if n <= d else centred.T @ centred
-    values, vectors = eigh(products, subset_by_index=[first, few - 1])
+    values, vectors = eigh(_products(centred), subset_by_index=[first, few - 1])
     values, vectors = np.maximum(values[::-1], 0.0) / n, vectors[:, ::-1]
     spanned = centred.T @ vectors if n <= d else vectors
     padded = np.zeros((d, count))

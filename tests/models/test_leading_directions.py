@@ -5,7 +5,7 @@ import pytest
 from sklearn.decomposition import PCA
 
 from facert.models.gaussian import Gaussian
-from facert.models.leading_directions import DENSE, RANK, LeadingDirections, narrowed
+from facert.models.leading_directions import RANK, LeadingDirections, principal_variances
 
 
 def frames(count=60, columns=400, rank=5, noise=0.01, seed=0):
@@ -79,9 +79,8 @@ def test_few_frames_leave_directions_without_variance():
     assert np.isfinite(found.fill(np.full((2, 400), np.nan))[1]).all()
 
 
-def test_frames_of_few_columns_stay_as_they_are_and_others_are_narrowed():
-    X = frames(columns=DENSE)
-    assert narrowed(X) is X
-    wide = np.repeat(X, 4, axis=1)
-    X, S = X - X.mean(0), narrowed(wide)
-    np.testing.assert_allclose(S @ S.T, X @ X.T, atol=1e-8)  # each column is there four times
+@pytest.mark.parametrize("shape", [(60, 400), (500, 40)], ids=["wide", "long"])
+def test_principal_variances_are_those_of_a_decomposition(shape):
+    X = frames(*shape)
+    expected = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) ** 2 / len(X)
+    np.testing.assert_allclose(principal_variances(X), expected, atol=1e-10)
