@@ -1,7 +1,3 @@
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 
 import h5py
@@ -12,7 +8,6 @@ import facert as api
 from facert.cli.commands.train import _shown
 from facert.io.tables.csv_table import CURVE
 from facert.io.tensors import write_tensors
-from facert.retarget import checkpoint
 from facert.retarget.checkpoint import CheckpointMetadata, checkpoint_path
 
 QUICK = ("--latent-dim", 3, "--neighbours", 5, "--unlabelled", 30)
@@ -92,114 +87,6 @@ def test_existing_outputs_stay_unless_they_may_be_replaced(facert, take, model, 
     assert facert("train", take, "-o", other, *options).code == 2
     assert (tmp_path / "curve.csv").read_text() == CURVE + "\n"
     assert not other.exists()
-
-
-def stopped_in_training(number, arguments, checkpoint):
-    """Exit code of ``facert`` in a process of its own, sent a signal once it has a checkpoint."""
-    # A shell may start its background jobs with Ctrl-C ignored.
-    code = """
-import signal
-from facert.cli.app import main
-signal.signal(signal.SIGINT, signal.default_int_handler)
-main()
-"""
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *map(str, arguments)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    while not checkpoint.exists() and process.poll() is None:
-        time.sleep(0.001)
-    process.send_signal(number)
-    return process.wait()
-
-
-@pytest.fixture
-def slow(tmp_path):
-    """Settings that leave time to stop a run."""
-    path = tmp_path / "slow.toml"
-    path.write_text(
-        'method = "ssgplvm"\ncheckpoint_every = 15\ntolerance = 0.0\nmax_iterations = 100\n'
-    )
-    return path
-
-
-@pytest.mark.parametrize("optimizer", ["lbfgs", "scg"])
-def test_a_killed_run_resumes_to_the_same_objective(facert, make_take, slow, tmp_path, optimizer):
-    take = tmp_path / "take.h5"
-    api.write_take(make_take(frames=160, animation=100), take)
-    options = ("--config", slow, "--optimizer", optimizer)
-    killed, whole = tmp_path / "killed.safetensors", tmp_path / "whole.safetensors"
-
-    first = ("train", take, "-o", killed, *options)
-    code = stopped_in_training(signal.SIGKILL, first, checkpoint_path(killed))
-    assert code == -signal.SIGKILL
-    assert not killed.exists()
-    resumed = facert(*first, "--resume")
-    assert resumed.code == 0, resumed.err
-    assert facert("train", take, "-o", whole, *options).code == 0
-
-    a, b = api.load(killed).figures, api.load(whole).figures
-    assert a["iterations"] == b["iterations"]
-    assert a["objective"] == pytest.approx(b["objective"], rel=1e-6)
-
-
-def test_ctrl_c_keeps_the_best_model_and_the_checkpoint(facert, make_take, slow, model, tmp_path):
-    take, quick = tmp_path / "take.h5", tmp_path / "quick.toml"
-    quick.write_text('method = "ssgplvm"\ncheckpoint_every = 15\nmax_iterations = 5000\n')
-    api.write_take(make_take(frames=160, animation=100), take)
-    arguments = ("train", take, "-o", model, "--config", slow)
-    assert stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model)) == 130
-    stopped = api.load(model).figures
-    assert stopped["status"] == "interrupted"
-    assert checkpoint_path(model).exists()
-
-    assert facert(*arguments, "--resume").code == 0
-    finished = api.load(model).figures
-    assert finished["iterations"] > stopped["iterations"]
-    assert finished["objective"] < stopped["objective"]
-    assert finished["status"] == "iteration limit"
-
-    assert facert(*arguments[:-1], quick, "--resume").code == 0
-    assert api.load(model).figures["status"] == "converged"
-    assert not checkpoint_path(model).exists()
-
-
-def test_a_run_ended_within_a_stage_resumes_to_the_same_file(facert, make_take, slow, tmp_path):
-    take = tmp_path / "take.h5"
-    api.write_take(make_take(frames=60, animation=40), take)
-    often = tmp_path / "often.toml"
-    often.write_text('method = "ssgplvm"\ncheckpoint_seconds = 0.0\nmax_iterations = 120\n')
-    (tmp_path / "whole").mkdir()
-    ended, whole = tmp_path / "model.safetensors", tmp_path / "whole" / "model.safetensors"
-    arguments = ("train", take, "-o", ended, "--config", often, "--log", tmp_path / "curve.csv")
-    assert stopped_in_training(signal.SIGTERM, arguments, checkpoint_path(ended)) == 143
-    assert api.load(ended).figures["status"] == "interrupted"
-    assert facert(*arguments, "--resume").code == 0
-    assert facert("train", take, "-o", whole, "--config", often).code == 0
-    assert ended.read_bytes() == whole.read_bytes()
-    lines = (tmp_path / "curve.csv").read_text().splitlines()
-    assert [int(line.partition(",")[0]) for line in lines[1:]] == list(range(1, len(lines)))
-
-
-def test_a_checkpoint_of_another_version_is_not_used(facert, take, slow, model, monkeypatch):
-    arguments = ("train", take, "-o", model, "--config", slow)
-    stopped_in_training(signal.SIGKILL, arguments, checkpoint_path(model))
-    monkeypatch.setattr(checkpoint, "_program", lambda: "another")
-    done = facert(*arguments, "--resume")
-    assert done.code == 0
-    assert "is of another version of facert: training begins anew" in done.err
-
-
-def test_a_checkpoint_of_another_take_is_refused(facert, make_take, take, slow, model, tmp_path):
-    arguments = ("train", take, "-o", model, "--config", slow)
-    stopped_in_training(signal.SIGKILL, arguments, checkpoint_path(model))
-    other = tmp_path / "other.h5"
-    api.write_take(make_take(seed=1), other)
-    refused = facert("train", other, "-o", model, "--config", slow, "--resume")
-    assert refused.code == 3
-    assert f"{checkpoint_path(model)}: fingerprint: expected" in refused.err
-    assert not model.exists()
 
 
 def test_resuming_without_a_checkpoint_trains_anew(facert, take, model):
@@ -357,18 +244,6 @@ def test_resume_without_a_checkpoint_does_not_replace_a_finished_model(facert, t
     refused = facert("train", take, "-o", model, "--labels", 5, *SHARED, "--resume")
     assert refused.code == 2
     assert model.read_bytes() == finished
-
-
-def test_the_log_goes_on_where_a_stopped_run_left_it(facert, make_take, slow, model, tmp_path):
-    take, curve = tmp_path / "take.h5", tmp_path / "curve.csv"
-    api.write_take(make_take(frames=160, animation=100), take)
-    arguments = ("train", take, "-o", model, "--config", slow, "--log", curve)
-    stopped_in_training(signal.SIGINT, arguments, checkpoint_path(model))
-    begun = curve.read_text()
-
-    assert facert(*arguments, "--resume").code == 0
-    assert curve.read_text().startswith(begun)
-    assert len(curve.read_text()) > len(begun)
 
 
 @pytest.mark.parametrize(
