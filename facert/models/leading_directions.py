@@ -136,7 +136,8 @@ class LeadingDirections(ArrayGroup):
 
 def principal_variances(X: FloatArray) -> FloatArray:
     """The variances of frames (n, d) along their principal directions, falling, (min(n, d),)."""
-    return np.maximum(np.linalg.eigvalsh(_products(X - X.mean(axis=0)))[::-1], 0.0) / len(X)
+    variances = np.linalg.eigvalsh(_products(X - X.mean(axis=0)))[::-1] / len(X)
+    return np.asarray(np.maximum(variances, 0.0))
 
 
 def _products(centred: FloatArray) -> FloatArray:
