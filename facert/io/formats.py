@@ -21,6 +21,7 @@ from facert.io.registry import (
     FORMATS,
     OWN_ENDINGS,
     Format,
+    endings,
     format_of,
     function,
     read,
@@ -144,7 +145,8 @@ def read_take_file(
 def require_take(found: Take | Rig, path: Path) -> Take:
     """What was read, if it is a take; raises `InputError` naming the file when it is a rig."""
     if isinstance(found, Rig):
-        raise InputError("file", "a take", "a rig", "Give a performance.", where=str(path))
+        fix = "Give a performance, or a table of poses: a rig goes to --rig."
+        raise InputError("file", "a take", "a rig", fix, where=str(path))
     return found
 
 
@@ -204,9 +206,13 @@ def read_rig_file(path: Path, shapes: str | None = None, drivers: Drivers | None
     InputError
         Also when the file holds a take.
     """
-    found = read_any(path, shapes=shapes, kind="rig", drivers=drivers)
-    if isinstance(found, Take):
-        raise InputError("file", "a rig", "a take", "Give a rig.", where=str(path))
+    path = Path(path)
+    found: Take | Rig | None = None
+    if not path.exists() or format_of(path, "read", "rig") or not format_of(path, "read", "take"):
+        found = read_any(path, shapes=shapes, kind="rig", drivers=drivers)
+    if not isinstance(found, Rig):
+        fix = f"Give a rig: {', '.join(endings('read', 'rig'))}, or a folder of .obj files."
+        raise InputError("file", "a rig", "a take", fix, where=str(path))
     return found
 
 

@@ -28,6 +28,8 @@ _SEPARATORS = (*JSON_SEPARATORS, b";", b"\t", b"\n")
 _ZEROS = 2**20
 """Bytes of 0 that a text may have, as one that a power cut ended does; more are a hole."""
 _AT_ONCE = 2**22
+_DAMAGED = 3
+"""Bytes that no text has, of which a text has by damage so many at most."""
 
 
 @contextmanager
@@ -109,9 +111,23 @@ def read_text(path: Path) -> str:
     try:
         _require_text(path)
         return path.read_text(encoding=encoding_of(path))
+    except UnicodeDecodeError as error:
+        raise _no_text(error) from error
     except (UnicodeError, OSError) as error:
         found, fix = "something else", "Save it as UTF-8."
         raise InputError("file", "UTF-8 text that can be read", found, fix) from error
+
+
+def _no_text(error: UnicodeDecodeError) -> InputError:
+    """The error about bytes that are none of their encoding: a few have a place, many have not."""
+    field, found, fix = "file", "something else", "Save it as UTF-8."
+    content = error.object
+    damaged = content.decode(error.encoding, errors="replace").count("\ufffd")
+    if damaged <= _DAMAGED:
+        line = content.count(b"\n", 0, error.start) + 1
+        field, found = f"line {line}", f"the byte 0x{content[error.start]:02x}, which is none"
+        fix = "Mend the line or copy the file again; of an old encoding, save it as UTF-8."
+    return InputError(field, "UTF-8 text that can be read", found, fix)
 
 
 def read_old_text(path: Path) -> str:
@@ -171,4 +187,6 @@ def parsing(
         if isinstance(error, OSError) and error.filename is not None:
             raise
         said = str(error) or type(error).__name__
+        if isinstance(error, UnicodeError):
+            said = "bytes that are no text"
         raise InputError(field, expected, f"{found} ({said})", fix) from error

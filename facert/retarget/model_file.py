@@ -24,6 +24,7 @@ from facert.data.typed import require_type
 from facert.data.version import VERSION
 from facert.errors import InputError, NumericalError, reading
 from facert.io.guarded import parsing
+from facert.io.registry import format_of
 from facert.io.tensors import FIX, read_tensors, write_tensors
 from facert.methods.base import Method
 from facert.methods.dense import is_dense
@@ -199,6 +200,11 @@ def read_model(path: Path, make: type[Model]) -> Model:
     if not path.exists():
         fix = "Give the model with -m, or make it: facert train."
         raise InputError("model", "a file that train wrote", "nothing", fix, str(path))
+    found = format_of(path, "read", "take", "rig")
+    if found is not None:
+        fix = "Give the model itself with -m; facert pose learns from a take by --poses."
+        known = f"a take or a rig ({found.endings[0]})"
+        raise InputError("model", "a file that train wrote", known, fix, str(path))
     methods: list[Method] = []
 
     def check(declared: Mapping[str, Shaped], metadata: ModelMetadata) -> None:

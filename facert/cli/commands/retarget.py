@@ -149,7 +149,7 @@ def _retarget(
     from facert.io.take import beside_recording, with_recording
     from facert.io.verdict import beside_result
 
-    retargeter = _loaded(model.resolve(), _stamp(model))
+    retargeter = _loaded(model, _stamp(model))
     take = read_source_file(source, target, retargeter.controls.names)
     began = time.perf_counter()
     chosen = options(retargeter)
@@ -172,20 +172,20 @@ def _retarget(
 
 
 @lru_cache(maxsize=1)
-def _loaded(model: Path, _stamp: tuple[int, int]) -> Retargeter:
+def _loaded(model: Path, _stamp: tuple[int, ...]) -> Retargeter:
     """The model of a file, read once a process until the file changes."""
     import facert
 
     return facert.load(model)
 
 
-def _stamp(path: Path) -> tuple[int, int]:
-    """Modification time and size of a file; zeros where there is none, which reading reports."""
+def _stamp(path: Path) -> tuple[int, ...]:
+    """What tells a file from others and from what it was; empty where there is none."""
     try:
         found = path.stat()
-    except OSError:
-        return 0, 0
-    return found.st_mtime_ns, found.st_size
+    except OSError:  # which reading reports
+        return ()
+    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _print_error(take: Take, result: Take, retargeter: Retargeter) -> None:

@@ -14,6 +14,7 @@ from facert.cli.shared.failures import described, is_unexpected, trace
 from facert.cli.shared.files import identity, require_other_file
 from facert.cli.shared.in_and_out import SWAPPED, require_in_and_out
 from facert.data.subject import about
+from facert.data.text import for_shell
 from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.evaluation.processes import call_each, cores
 from facert.io.claims import claim, claims_kept
@@ -60,6 +61,7 @@ def plan(
     OutputExistsError
         For a single OUT that exists and may not be replaced.
     """
+    _require_no_model(paths)
     if out_dir is None:
         source, output = _single(paths, {"--ending": ending, "--jobs": jobs})
         _require_kept([output], others)
@@ -83,6 +85,14 @@ def plan(
     out_dir.mkdir(parents=True, exist_ok=True)
     count = 1 if jobs is None else jobs or cores()
     return Plan(tuple(zip(sources, outputs, strict=True)), many=True, jobs=count)
+
+
+def _require_no_model(paths: Sequence[Path]) -> None:
+    """Refuse a model among the takes: it has an option of its own."""
+    for path in paths:
+        if path.suffix.lower() == ".safetensors":
+            fix = "Give it with --model, and the takes in the order IN OUT."
+            raise InputError("IN or OUT", "a take", "a model", fix, where=str(path))
 
 
 def _require_kept(outputs: Sequence[Path], others: Sequence[Path | None]) -> None:
@@ -154,6 +164,9 @@ def _single(paths: Sequence[Path], many: dict[str, object]) -> tuple[Path, Path]
 
 def _require_single(source: Path, output: Path, overwrite: bool, kinds: tuple[Kind, ...]) -> None:
     """Refuse what cannot be read or written; two that are there may both be takes to read."""
+    if source.is_dir() and ("rig" not in kinds or not output.suffix):
+        fix = f"For all takes of a folder: --out-dir {for_shell(output.name)}."
+        raise InputError("IN", "a file, where OUT is one", "a folder", fix, where=str(source))
     try:
         require_in_and_out(source, output, overwrite, *kinds)
     except OutputExistsError as error:

@@ -211,7 +211,8 @@ def _require_observed(table: Table, column: int) -> None:
 def _frame_clock(table: Table, column: int, fps: float | None) -> Clock:
     name, values = table.names[column], table.numbers[:, column]
     if fps is None:
-        fix = "Add a column time, or run facert convert with --in-fps."
+        fix = "Add a column time, or run facert convert with --in-fps; poses of frames of a "
+        fix += "recording are brought in by facert convert RECORDING OUT.h5 --poses FILE."
         raise InputError(f"column {name}", "the rate of the frames", "none", fix)
     origin = 0.0 if name.strip().lower() == "frame" else float(values[0])
     seconds = put_together((values - origin) / fps, table.numbers, table.place)
