@@ -170,6 +170,15 @@ def require_plain(text: str, path: str) -> None:
         )
 
 
+def lengths(vectors: FloatArray) -> FloatArray:
+    """Lengths of vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    squares = x * x
+    squares += y * y
+    squares += z * z
+    return np.asarray(np.sqrt(squares, out=squares))
+
+
 def rms(errors: FloatArray) -> float:
     """Root mean square over all elements, the papers' error measure."""
     return float(np.sqrt(np.mean(np.square(errors))))

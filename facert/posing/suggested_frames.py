@@ -27,9 +27,10 @@ from facert.data.subject import about
 from facert.data.take import SourceKind, Take
 from facert.data.takes import Takes
 from facert.errors import InputError
-from facert.models.gaussian import fill_gaps
+from facert.models.gaussian import TOGETHER, fill_gaps
 from facert.models.whitening import whitening
 from facert.posing.medoids import LEAST_GAIN, MedoidProblem
+from facert.preprocess.motion.motion_factors import fill_by_factors
 from facert.preprocess.training_set import MIN_OBSERVED
 from facert.retarget.retargeter import Retargeter
 from facert.settings import Settings
@@ -205,10 +206,12 @@ def _features(take: Take, frames: IntArray, learned: FloatArray | None) -> Float
         matrix = np.vstack([matrix, learned])
     matrix = matrix[:, ~np.isnan(matrix).all(axis=0)]
     normalised = Normalisation.of(matrix, f"/source/{take.source.kind}").apply(matrix)
-    filled = fill_gaps(normalised)
+    many = normalised.shape[1] > TOGETHER
+    filled = fill_by_factors(normalised) if many else fill_gaps(normalised)
     if filled.shape[1] > max(MANY, len(filled)):  # they span as many directions as there are rows
-        u, spread, _ = np.linalg.svd(filled - filled.mean(axis=0), full_matrices=False)
-        filled = u * spread
+        centred = filled - filled.mean(axis=0)
+        squares, u = np.linalg.eigh(centred @ centred.T)
+        filled = (u * np.sqrt(np.maximum(squares, 0.0)))[:, ::-1]
     axes = whitening(filled, POWERS[take.source.kind])
     return np.asarray((filled - filled.mean(axis=0)) @ axes)
 

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray, require_sensible
+from facert.data.arrays import BoolArray, FloatArray, IntArray, lengths, require_sensible
 from facert.data.names import match
 from facert.data.take import Source, Take
 from facert.errors import InputError
@@ -98,12 +98,12 @@ def stabilise(
         found = stable_markers(_markers(reference.source))
         stable = [reference.source.names[index] for index in found]
     chosen = _chosen(take.source, stable)
-    require_sensible(np.nan_to_num(markers[:, chosen]), "/source/markers")
-    shape = _mean_shape(markers[:, chosen])
-    seen = ~np.isnan(markers[:, chosen, 0])
+    points = markers[:, chosen]
+    require_sensible(np.nan_to_num(points), "/source/markers")
+    shape, seen = _mean_shape(points), ~np.isnan(points[:, :, 0])
     known = determined(shape, seen)
     _require_known(known)
-    shape, motion = _rigid(shape, markers[:, chosen], known)
+    shape, motion = _rigid(shape, points, known)
     motion = motion.interpolated(take.time, known)
     if isinstance(reference, Take):
         steady = _steady_shape(reference.source, take.source, chosen)
@@ -111,7 +111,7 @@ def stabilise(
     else:
         pose = _pose(motion, known, reference)
     head = motion.after(pose.inverse())
-    left = np.linalg.norm(motion.undo(markers[:, chosen]) - shape, axis=2)[known[:, None] & seen]
+    left = lengths(motion.undo(points) - shape)[known[:, None] & seen]
     return Stabilised(
         replace(take, source=Source(head.undo(markers), take.source.names)),
         head,
@@ -169,8 +169,8 @@ def _distance_change(markers: FloatArray) -> FloatArray:
     rows = max(AT_ONCE // (few.shape[1] * count), 1)
     for start in range(0, count, rows):
         here = slice(start, start + rows)
-        distance = np.linalg.norm(few[here, None] - few[None, start:], axis=3)
-        farthest = max(farthest, float(np.nanmax(distance, initial=0.0)))
+        distance = lengths(few[here, None] - few[None, start:])
+        farthest = max(farthest, float(np.fmax.reduce(distance, None, initial=0.0)))
         low, high = _quantiles(distance, (0.05, 0.95))
         change[here, start:] = (high - low) / 2.0
         change[start:, here] = change[here, start:].T
@@ -259,7 +259,7 @@ def _reweighted(
 ) -> tuple[RigidMotion, FloatArray]:
     """The motion to points (T, m, 3) from a first guess of it, and the weights that it is by."""
     for _ in range(REWEIGHTED):
-        away = np.linalg.norm(motion.undo(points) - shape, axis=2)
+        away = lengths(motion.undo(points) - shape)
         ordinary = np.nanquantile(away[known], ORDINARY) + np.finfo(float).tiny
         weights = seen / (1.0 + np.nan_to_num(away / (STRAY * ordinary)) ** 2) ** 2
         motion = align(shape, points, weights)

@@ -234,7 +234,7 @@ def _draw_markers(
     """
     require_bounded(markers, "/source/markers")
     markers = markers[:, ~np.isnan(markers).all(axis=(0, 2))]
-    rest = np.nanmedian(markers, axis=0)
+    rest = np.nanmedian(markers, axis=0) if rings else markers[0]
     low, high = (bound(markers, axis=(0, 1)) for bound in (np.nanmin, np.nanmax))
     middle, reach = (low + high) / 2, room * max(float((high - low)[:2].max()), 1e-9)
     for axes, frame in zip(cells, frames, strict=False):

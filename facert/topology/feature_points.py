@@ -16,7 +16,8 @@ from facert.data.names import match
 from facert.data.rig import Mesh
 from facert.data.take import Source, Take
 from facert.errors import InputError
-from facert.models.gaussian import fill_gaps
+from facert.models.gaussian import TOGETHER, fill_gaps
+from facert.preprocess.motion.motion_factors import fill_by_factors
 from facert.topology.labels import checked_labels
 
 Where = Mapping[str, object] | Literal["names", "nearest"]
@@ -93,7 +94,8 @@ def without_gaps(source: Source) -> FloatArray:
     hidden = np.count_nonzero(~source.valid)
     if hidden:
         log.info("%d of %d positions were hidden: filled", hidden, source.valid.size)
-    return fill_gaps(source.matrix)
+    many = source.matrix.shape[1] > TOGETHER
+    return fill_by_factors(source.matrix) if many else fill_gaps(source.matrix)
 
 
 def named_vertices(names: Sequence[str]) -> IntArray:

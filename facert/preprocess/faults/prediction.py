@@ -12,11 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray, lengths
 from facert.data.blocks import blocks, spread
-from facert.data.normalisation import Normalisation, deviation
+from facert.data.normalisation import Normalisation
 from facert.models.gaussian import Gaussian
-from facert.preprocess.motion.motion_factors import MotionFactors, part_of
+from facert.preprocess.motion.motion_factors import MotionFactors, part_of, units_of
 from facert.preprocess.motion.series import interpolated
 
 FIT, FIT_MANY = 500, 200
@@ -81,15 +81,6 @@ def some_frames(hidden: BoolArray, most: int = FIT) -> IntArray:
     return np.union1d(rows, hidden[:, lost].argmin(axis=0)) if len(lost) else rows
 
 
-def lengths(vectors: FloatArray) -> FloatArray:
-    """Lengths of vectors (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    squares = x * x
-    squares += y * y
-    squares += z * z
-    return np.asarray(np.sqrt(squares, out=squares))
-
-
 @dataclass(frozen=True, eq=False)
 class _Joint:
     """A Gaussian of all coordinates."""
@@ -105,10 +96,19 @@ class _Joint:
         return cls(fitted)
 
     def fill(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
-        left = np.where(suspect[:, :, None], np.nan, markers)
-        return self.gaussian.fill(_flat(left)).reshape(markers.shape)
+        filled = np.empty(markers.shape)
+        for rows in blocks(len(markers), 3 * markers.shape[1], IN_MEMORY):
+            left = np.where(suspect[rows][:, :, None], np.nan, markers[rows])
+            filled[rows] = self.gaussian.fill(_flat(left)).reshape(left.shape)
+        return filled
 
     def off(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
+        result = np.empty(suspect.shape)
+        for rows in blocks(len(markers), 3 * markers.shape[1], IN_MEMORY):
+            result[rows] = self._off(markers[rows], suspect[rows])
+        return result
+
+    def _off(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
         frames, count = suspect.shape
         filled = self.fill(markers, suspect)
         P = self.gaussian.precision
@@ -133,16 +133,14 @@ class _Directions:
     def of(cls, markers: FloatArray, noise: float) -> _Directions:
         ever = np.repeat(~np.isnan(markers[:, :, 0]).all(axis=0), 3)
         X = _flat(markers)[:, ever]
-        columns = list(blocks(X.shape[1], len(X)))
-        mean = np.concatenate([np.nanmean(X[:, own], axis=0) for own in columns])
-        scale = max(float(deviation(X[:, own]).max()) for own in columns) or 1.0
-        X = Normalisation(mean, scale).apply(X)
+        own = units_of(X)
+        X, scale = own.apply(X), own.scale
         filled = interpolated(X[:, part_of(X.shape[1])], np.arange(len(X), dtype=np.float64))
         count = min(DIRECTIONS, len(X) - 1)
         found = MotionFactors.learned(X, filled, noise / scale, count, ITERATIONS)
         place = np.where(ever, np.cumsum(ever) - 1, 0)
         factors = found.with_noise((noise / scale) ** 2).at(place)
-        units = Normalisation(np.where(ever, mean[place], np.nan), scale)
+        units = Normalisation(np.where(ever, own.mean[place], np.nan), scale)
         return cls(factors, units, np.flatnonzero(ever)[part_of(X.shape[1])])
 
     def fill(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:

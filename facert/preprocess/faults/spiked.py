@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from facert.data.arrays import BoolArray, FloatArray
+from facert.data.arrays import BoolArray, FloatArray, lengths
 from facert.data.blocks import blocks, spread
 from facert.data.normalisation import deviation
-from facert.preprocess.faults.prediction import ALL, expected_of, lengths, some_frames
+from facert.preprocess.faults.prediction import ALL, expected_of, some_frames
 from facert.preprocess.motion.series import interpolated
 
 ORDINARY, FAR = 0.9, 3.0

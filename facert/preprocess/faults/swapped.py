@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facert.data.arrays import BoolArray, FloatArray, IntArray
+from facert.data.arrays import BoolArray, FloatArray, IntArray, lengths
 from facert.data.blocks import blocks, spread
-from facert.preprocess.faults.prediction import lengths, predicted
+from facert.preprocess.faults.prediction import predicted
 from facert.preprocess.faults.quantiles import median
 
 AT_ONCE = 4_000_000

@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 from facert.data.array_group import ArrayGroup
 from facert.data.arrays import BoolArray, FloatArray, IntArray
 from facert.data.blocks import blocks, spread
+from facert.data.normalisation import Normalisation, deviation
 
 ITERATIONS = 16
 COARSE, FINE = 0.1, 1e-3
@@ -29,6 +30,8 @@ IN_A_PRODUCT = 1 << 21
 """Numbers of the frames that are looked at together."""
 FEW = 16
 """Where a matrix hides less than one of so many entries, these alone are summed."""
+FILLING = 24
+"""Factors that gaps of very many columns are filled by."""
 ONCE_MORE = 1.0
 """The prior of each weight counts as much as so many frames of its factor."""
 
@@ -148,6 +151,29 @@ class MotionFactors(ArrayGroup):
         return MotionFactors(self.mean, self.weights @ turn[:, ::-1], self.noise)
 
 
+def fill_by_factors(X: FloatArray, count: int = FILLING) -> FloatArray:
+    """Replace every NaN of rows (n, d) by what some factors of all columns make of the others.
+
+    In proportion to rows and columns; every column has at least one observation.
+    """
+    hidden = np.isnan(X)
+    if not hidden.any():
+        return X
+    units = units_of(X)
+    given = units.apply(X)
+    guess = np.nan_to_num(given[:, part_of(X.shape[1])])
+    factors = MotionFactors.learned(given, guess, 0.0, min(count, len(X) - 1))
+    z, _ = factors.posterior(given)
+    return np.where(hidden, units.undo(factors.frames(z)), X)
+
+
+def units_of(X: FloatArray) -> Normalisation:
+    """The normalisation of frames (n, d), NaN: not observed; also of such that do not move."""
+    parts = [X[:, columns] for columns in blocks(X.shape[1], len(X))]
+    mean = np.concatenate([np.nanmean(part, axis=0) for part in parts])
+    return Normalisation(mean, max(float(deviation(part).max()) for part in parts) or 1.0)
+
+
 def part_of(columns: int) -> IntArray:
     """The columns that factors are learned from."""
     return spread(columns, PART)
@@ -185,6 +211,11 @@ class _Shown(NamedTuple):
         hidden = np.isnan(X)
         return cls(np.where(hidden, 0.0, X), hidden) if hidden.any() else cls(X, None)
 
+    def at(self, columns: slice) -> _Shown:
+        """The same of some columns."""
+        hidden = None if self.hidden is None else self.hidden[:, columns]
+        return _Shown(self.known[:, columns], hidden)
+
     def sums(self, values: FloatArray, axis: int = 1) -> FloatArray:
         """Sums of values (d, k) over what each frame shows; or, by axis 0, the other way round.
 
@@ -207,16 +238,27 @@ def _maximised(shown: _Shown, z: FloatArray, covariance: FloatArray, least: floa
     moments[:, :q, :q] = covariance + z[:, :, None] * z[:, None, :]
     moments[:, q, :q] = moments[:, :q, q] = z
     moments[:, q, q] = 1.0
-    one, other = _pairs(q + 1)
-    sums = shown.sums(moments[:, one, other], axis=0)
-    X = shown.known
-    pull = X.T @ np.hstack([z, np.ones((n, 1))])
-    prior = np.diag([*[ONCE_MORE] * q, 0.0])
-    normal = _symmetric(sums, q + 1) + prior
-    rows = np.linalg.solve(normal, pull[:, :, None])[:, :, 0].astype(np.float64)
-    left = np.einsum("nd,nd->d", X, X) - 2.0 * (rows * pull).sum(axis=1)
-    left += (np.where(one == other, 1.0, 2.0) * sums * _products(rows, rows)).sum(axis=1)
-    noise = np.maximum(left / sums[:, -1], least**2)
+    halves, first = moments[:, *_pairs(q + 1)], np.hstack([z, np.ones((n, 1))])
+    parts = [
+        _regressed(shown.at(columns), halves, first, least)
+        for columns in blocks(shown.known.shape[1], (q + 1) ** 2)
+    ]
+    rows, noise = (np.concatenate(one) for one in zip(*parts, strict=True))
     root = np.linalg.cholesky(moments[:, :q, :q].mean(axis=0))  # z has unit covariance again
     weights = np.asarray(rows[:, :q] @ root, dtype=np.float64)
     return MotionFactors(rows[:, q], weights, noise)
+
+
+def _regressed(
+    shown: _Shown, halves: FloatArray, first: FloatArray, least: float
+) -> tuple[FloatArray, FloatArray]:
+    """Weights and mean (d, q + 1) and noise (d,) of columns, by moments of [z, 1] in each frame."""
+    one, other = _pairs(first.shape[1])
+    sums, X = shown.sums(halves, axis=0), shown.known
+    pull = X.T @ first
+    prior = np.diag([*[ONCE_MORE] * (first.shape[1] - 1), 0.0])
+    normal = _symmetric(sums, first.shape[1]) + prior
+    rows = np.linalg.solve(normal, pull[:, :, None])[:, :, 0].astype(np.float64)
+    left = np.einsum("nd,nd->d", X, X) - 2.0 * (rows * pull).sum(axis=1)
+    left += (np.where(one == other, 1.0, 2.0) * sums * _products(rows, rows)).sum(axis=1)
+    return rows, np.maximum(left / sums[:, -1], least**2)
