@@ -33,13 +33,14 @@ from facert.methods.base import (
     TrainingReport,
     Unlabelled,
     WarmStart,
-    stacked,
 )
 from facert.models.leading_directions import RANK, LeadingDirections
 from facert.models.optim.monitor import Monitor
 from facert.models.threads import threads_for
 from facert.settings import Settings
 
+FRAMES = 1000
+"""Frames with a pose, and without, that directions are found from, at most, evenly spread."""
 DIRECTIONS, INNER = "directions.", "scores."
 """What stands before the names of arrays of the directions, and of the method on the scores."""
 
@@ -79,7 +80,8 @@ class Dense:
         """Find the directions of all frames, and fit the method to the scores."""
         with threads_for(RANK):
             if not self._begun:
-                self.directions_ = LeadingDirections.learned(stacked(labelled, unlabelled)[0])
+                some = [X[:: max(-(-len(X) // FRAMES), 1)] for X in (labelled.X, unlabelled.X)]
+                self.directions_ = LeadingDirections.learned(np.vstack(some))
             own = Labelled(self.scores(labelled.X), labelled.Y)
             rest = replace(unlabelled, X=self.scores(unlabelled.X))
         report = self.method.fit(own, rest, monitor or Monitor())

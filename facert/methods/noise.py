@@ -40,10 +40,14 @@ def expected_noise(X: FloatArray, latent_dim: int) -> float:
     float
         √λ_{q+1}, not below `LEAST` nor above `MOST`.
     """
-    X = X[:: -(-len(X) // ENOUGH)] if X.shape[1] > DENSE else X
     variances = principal_variances(X) / max(X.shape[1] / DENSE, 1.0)  # as methods see it
     left_over = variances[latent_dim] if latent_dim < len(variances) else 0.0
     return float(np.clip(np.sqrt(left_over), LEAST, MOST))
+
+
+def enough(X: FloatArray) -> FloatArray:
+    """Frames (n, d), of a dense source only some, evenly spread, to estimate the noise from."""
+    return X[:: -(-len(X) // ENOUGH)] if X.shape[1] > DENSE else X
 
 
 def with_noise(settings: Settings, X: FloatArray) -> Settings:

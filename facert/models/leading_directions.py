@@ -27,8 +27,6 @@ DENSE = 384
 """Columns, beyond which a source enters by its leading directions: 128 markers."""
 RANK = 150
 """r at most. Half of the directions or so show noise alone, and from them it is estimated."""
-FRAMES = 2000
-"""Frames that the directions are found from, at most, evenly spread."""
 ITERATIONS, FRAMES_EACH = 8, 4
 """Of expectation maximisation through gaps; and frames for each of its directions, at least."""
 LEAST_NOISE = 1e-6
@@ -59,7 +57,7 @@ class LeadingDirections(ArrayGroup):
         """
         hidden = np.isnan(X)
         if not hidden.any():
-            return cls._of_complete(X[:: -(-len(X) // FRAMES)], RANK)
+            return cls._of_complete(X, RANK)
         most = max(min(RANK, len(X) // FRAMES_EACH), 1)
         filled = np.where(hidden, np.nanmean(X, axis=0), X)
         for count in np.geomspace(1, most, ITERATIONS).round().astype(int).tolist():

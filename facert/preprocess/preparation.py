@@ -265,9 +265,10 @@ def _step(takes: Takes) -> float:
 
 def _complete_frames(source: Source, chosen: TrainingSet) -> FloatArray:
     """Frames that show everything, (n, d); where they are few, the filled ones of the training."""
-    complete = source.matrix[~np.isnan(source.matrix).any(axis=1)]
-    filled = np.vstack([chosen.X_labelled, chosen.X_unlabelled])
-    return complete if len(complete) > len(filled) else filled
+    shown = ~np.isnan(source.matrix).any(axis=1)
+    if np.count_nonzero(shown) > len(chosen.X_labelled) + len(chosen.X_unlabelled):
+        return source.matrix[shown]
+    return np.vstack([chosen.X_labelled, chosen.X_unlabelled])
 
 
 def _neutral(takes: Takes, chosen: TrainingSet, settings: Settings) -> FloatArray:

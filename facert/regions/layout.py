@@ -11,7 +11,7 @@ from facert.data.normalisation import Normalisation
 from facert.data.regions import Region, Regions
 from facert.data.take import Source
 from facert.errors import InputError
-from facert.methods.noise import with_noise
+from facert.methods.noise import enough, with_noise
 from facert.preprocess.preparation import TrainingData
 from facert.regions.automatic import label_errors
 from facert.regions.regional import RegionLayout
@@ -48,7 +48,7 @@ def lay_out(regions: Regions, data: TrainingData, settings: Settings) -> RegionL
         target = _units(poses.compress(moved, axis=1), f"regions.{region.name}.controls")
         unit = own.scale / data.prepared.units.scale
         expected = with_noise(
-            _in_unit(settings, unit), own.apply(data.complete.compress(seen, axis=1))
+            _in_unit(settings, unit), own.apply(enough(data.complete.compress(seen, axis=1)))
         )
         units.append([unit, target.scale / data.target_units.scale])
         noise.append([expected.sigma_c, expected.source_noise_floor])

@@ -12,7 +12,7 @@ from facert.data.arrays import FloatArray
 from facert.data.normalisation import Normalisation
 from facert.data.regions import Regions
 from facert.methods.base import Labelled, Method, TrainingReport, Unlabelled, WarmStart
-from facert.methods.noise import with_noise
+from facert.methods.noise import enough, with_noise
 from facert.methods.registry import method_class
 from facert.models.leading_directions import DENSE
 from facert.models.optim.monitor import Monitor
@@ -82,7 +82,8 @@ def learn(
     source, target, chosen = data.prepared.units, data.target_units, data.chosen
     layout = None if regions is None else lay_out(regions, data, given)
     dense = len(source.mean) > DENSE
-    method = untrained_method(with_noise(given, source.apply(data.complete)), dense, layout)
+    open_noise = source.apply(enough(data.complete))
+    method = untrained_method(with_noise(given, open_noise), dense, layout)
     if start is not None and method_class(given.method).stepwise:
         _begin(method, start, source, target)
     labelled = Labelled(source.apply(chosen.X_labelled), target.apply(chosen.Y_labelled))
@@ -95,7 +96,8 @@ def learn(
     began = time.perf_counter()
     report = method.fit(labelled, unlabelled, monitor)
     seconds = time.perf_counter() - began
-    warn_if_constant(method, np.vstack([labelled.X, unlabelled.X]), labelled.Y)
+    some = unlabelled.X[:: max(len(unlabelled.X) // MOST_FRAMES, 1)]
+    warn_if_constant(method, np.vstack([labelled.X, some]), labelled.Y)
     return Learned(method, report, seconds)
 
 
