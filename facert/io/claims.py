@@ -12,6 +12,7 @@ machines and containers have as well.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import logging
 import os
@@ -113,6 +114,8 @@ def writing_errors(path: Path) -> Iterator[None]:
     except OSError as error:
         expected, found = "a name in a folder that can be written to", error.strerror or str(error)
         fix = "Choose another place, or make room there."
+        if error.errno == errno.EFBIG:
+            fix = "Raise the limit of this shell (ulimit -f), or write less."
         raise InputError("output", expected, found, fix, where=str(path)) from error
 
 

@@ -19,6 +19,8 @@ from facert.errors import InputError, OutputExistsError, OutputKeptError
 from facert.io.claims import claim
 from facert.io.content import endings_by_content
 from facert.io.guarded import door, parsing
+from facert.io.pictures import bears_mark as pictures_mark
+from facert.io.pictures import may_bear_mark
 
 Kind = Literal["take", "rig", "mesh", "mesh sequence", "morphs"]
 Use = Literal["read", "write"]
@@ -252,14 +254,15 @@ def is_foreign(path: Path) -> bool:
     """Whether there is a file of a format that facert reads or writes, and facert did not write it.
 
     It is of a format by its ending or by its content, and facert's by the format's mark, or by that
-    of any text of facert's. An empty file is nobody's; one that cannot be read is somebody's.
+    of any text of facert's; so is a picture, a clip or a page. An empty file is nobody's; one that
+    cannot be read is somebody's.
     """
     if not path.is_file() or not path.stat().st_size:
         return False
     name, held = path.name.lower(), set(endings_by_content(path, likely=True))
     formats = [one for one in FORMATS if name.endswith(one.endings) or held & set(one.endings)]
     if not formats:
-        return False
+        return may_bear_mark(path) and not pictures_mark(path)
     with suppress(InputError), parsing("file", "one that bears a mark"):
         marks = dict.fromkeys([*(one.mark for one in formats if one.mark), *_TEXT_MARKS])
         return not any(function(mark)(path) for mark in marks)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import os
 import re
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facert.data.version import CREATED_BY
 from facert.errors import InputError
 from facert.io.atomic import replacing, write_bytes
 from facert.io.registry import require_replaceable
@@ -68,7 +70,8 @@ def _write_gif(pictures: Pictures, path: Path, fps: float, overwrite: bool) -> N
     others = (image.quantize(palette=first, dither=Image.Dither.NONE) for image in images)
     duration = max(20, 10 * round(100 / fps))  # milliseconds; viewers slow down shorter ones
     content = BytesIO()
-    first.save(content, "GIF", save_all=True, append_images=others, duration=duration, loop=0)
+    options = {"duration": duration, "loop": 0, "comment": CREATED_BY.encode()}
+    first.save(content, "GIF", save_all=True, append_images=others, **options)
     write_bytes(content.getvalue(), path, overwrite)
 
 
@@ -86,8 +89,9 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
     rate = str(Fraction(fps).limit_denominator())
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", rate)
     coded = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", _QUALITY)
+    mark = ("-metadata", f"comment={CREATED_BY}")
     to = f"file:{path.absolute()}"  # a name alone might be taken for an option or a protocol
-    command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, to)
+    command = (get_ffmpeg_exe(), "-v", "error", "-y", *raw, "-i", "-", *coded, *mark, to)
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -107,6 +111,8 @@ def _code(pictures: Pictures, path: Path, fps: float) -> None:
             raise
     if process.returncode:
         said = re.sub(r"\[.*?\] ", "", message.partition("\n")[0]).replace(to, "it")
+        if process.returncode == -getattr(signal, "SIGXFSZ", 0):
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
         raise OSError(errno.EIO, f"ffmpeg: {said or f'status {process.returncode}'}")
 
 

@@ -104,7 +104,7 @@ def test_the_damaged_one_of_several_files_is_named(facert, folder: Path, damaged
 
 def test_nothing_is_written_over(facert, folder: Path) -> None:
     (folder / "clip.gif").write_text("mine")
-    assert facert("render", folder / "face.h5", folder / "clip.gif").code == 2
+    assert facert("render", folder / "face.h5", folder / "clip.gif").code == 3
     assert (folder / "clip.gif").read_text() == "mine"
 
 

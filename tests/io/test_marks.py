@@ -200,8 +200,8 @@ def test_an_empty_file_is_nobodys(tmp_path: Path) -> None:
             require_replaceable(path, overwrite=False)
 
 
-def test_endings_that_facert_does_not_read_are_replaced_as_before(tmp_path: Path) -> None:
-    path = tmp_path / "picture.png"
+def test_endings_that_facert_does_not_know_are_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "picture.bmp"
     path.write_bytes(b"anything")
     with replacing(path, overwrite=True) as temporary:
         temporary.write_bytes(b"new")

@@ -11,6 +11,7 @@ from facert.cli.shared import console
 from facert.data.text import for_json
 from facert.errors import InputError, OutputKeptError, reading
 from facert.io.atomic import write_bytes, write_text
+from facert.io.pictures import METADATA
 from facert.io.registry import require_replaceable
 
 if TYPE_CHECKING:
@@ -185,7 +186,8 @@ def save_picture(figure: Figure, path: Path, overwrite: bool) -> None:
     from facert.render.texts import with_plain_texts
 
     content = io.BytesIO()
-    with_plain_texts(figure).savefig(content, format=path.suffix[1:].lower())
+    ending = path.suffix.lower()
+    with_plain_texts(figure).savefig(content, format=ending[1:], metadata=METADATA[ending])
     write_bytes(content.getvalue(), path, overwrite)
 
 

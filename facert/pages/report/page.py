@@ -10,6 +10,7 @@ from jinja2 import Environment, StrictUndefined, Template
 
 from facert.data.text import printable_lines
 from facert.data.verdict import LEVELS
+from facert.data.version import CREATED_BY
 from facert.pages.report.comparison_section import comparison_section
 from facert.pages.report.judged import summary_section, worst_first
 from facert.pages.report.sections import ReportPage, Section
@@ -26,7 +27,7 @@ def make_report(title: str, sections: tuple[Section, ...]) -> ReportPage:
 
 def to_html(report: ReportPage) -> str:
     """The page; the same report gives the same text. All that came from files is escaped."""
-    return _template().render(report=report, levels=LEVELS)
+    return _template().render(report=report, levels=LEVELS, created_by=CREATED_BY)
 
 
 @cache
