@@ -114,11 +114,11 @@ class Dense:
         return np.asarray(self.directions_.basis**2)
 
     def cleaned(self, filled: FloatArray, scores: FloatArray, by_method: FloatArray) -> FloatArray:
-        """Filled frames (T, d_x) with what the method makes of their scores."""
-        if by_method is scores:
+        """Filled frames (T, d_x); of a method that cleans scores, what these stand for."""
+        if np.array_equal(by_method, scores):
             return filled
-        change = self.directions_.density * (by_method - scores)
-        return filled + change @ self.directions_.basis.T
+        found = self.directions_
+        return np.asarray(found.mean + found.density * by_method @ found.basis.T)
 
     def predict(self, frames: FloatArray, input_variance: FloatArray | None = None) -> Prediction:
         """Map frames (T, d_x), each on its own; NaN: not observed. See `Method.predict`."""

@@ -91,6 +91,22 @@ def test_hidden_markers_are_filled_and_seen_ones_kept(trained, take):
     assert found.std[6].mean() >= found.std[30].mean()
 
 
+def test_methods_are_given_lengths_as_if_fewer_columns_had_shown_them(trained, take):
+    model = trained("nearest")
+    X = model.source_units.apply(take.source.matrix)
+    S, X = model.method.scores(X), X - model.method.directions_.mean
+    expected = np.linalg.norm(X, axis=1) * np.sqrt(DENSE / (3 * MARKERS))
+    np.testing.assert_allclose(np.linalg.norm(S, axis=1), expected, rtol=1e-3)
+
+
+def test_what_a_method_makes_of_the_source_reaches_the_frames(trained, take):
+    model = trained("ssgplvm")
+    noise = 0.1 * np.random.default_rng(0).normal(size=take.source.matrix.shape)
+    X = model.source_units.apply(take.source.matrix)
+    found = model.method.predict(X + noise).X
+    assert rms(found - X) < 0.5 * rms(noise)
+
+
 def test_one_by_one_as_all_at_once(trained, take):
     gappy = hidden(take)
     for name in ("auto", "nearest"):
@@ -105,6 +121,8 @@ def test_a_shared_model_begins_at_a_trained_one(trained, take, truth, pose_few):
     assert isinstance(start.method, DenseStepwise)
     more = replace(take, params=np.where(np.arange(60)[:, None] == 31, truth.params, take.params))
     anew = facert.train(more, start.settings, start=start)
+    before, after = start.method.directions_.basis, anew.method.directions_.basis
+    assert np.array_equal(before, after)
     assert anew.figures["iterations"] <= facert.train(more, start.settings).figures["iterations"]
     assert rms(anew.retarget(take).params - truth.params) < 0.25
 

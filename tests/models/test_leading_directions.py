@@ -14,7 +14,7 @@ def frames(count=60, columns=400, rank=5, noise=0.01, seed=0):
     return shown @ rng.normal(size=(rank, columns)) + noise * rng.normal(size=(count, columns))
 
 
-@pytest.mark.parametrize("shape", [(60, 400), (500, 40)], ids=["wide", "long"])
+@pytest.mark.parametrize("shape", [(60, 400), (500, 40), (300, 400)], ids=["wide", "long", "both"])
 def test_directions_are_the_principal_ones(shape):
     X = frames(*shape)
     found, reference = LeadingDirections.learned(X), PCA(5).fit(X)
@@ -22,6 +22,10 @@ def test_directions_are_the_principal_ones(shape):
     np.testing.assert_allclose(found.variances[:5], ratio, rtol=1e-9)
     alike = np.abs(np.sum(found.basis[:, :5] * reference.components_.T, axis=0))
     np.testing.assert_allclose(alike, 1.0, atol=1e-9)
+    left = np.square(X - X.mean(axis=0)).sum() / len(X) - found.variances.sum()
+    columns = max(shape[1] - found.basis.shape[1], 1)
+    total = np.square(X - X.mean(axis=0)).mean()
+    np.testing.assert_allclose(found.noise, max(left / columns, 1e-6 * total), rtol=1e-6)
     r = found.basis.shape[1]
     assert r == min(RANK, shape[1])
     np.testing.assert_allclose(found.basis.T @ found.basis, np.eye(r), atol=1e-12)
