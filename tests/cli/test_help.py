@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,8 @@ COMMANDS = {
 }
 # They wait for Ctrl-C, or take minutes: that they can be parsed must do.
 LONG = ("facert view", "facert pose --view", "facert live", "facert eval --labels", ".gif")
+SHORTER = {"training.h5": 600, "performance.h5": 150}
+"""Frames that are left of the demo's takes: the examples do the same with them."""
 # What one of a command's examples makes, and those of others take.
 WRITTEN = {
     "demo": "facert-demo",
@@ -39,6 +42,17 @@ def _made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("examples")
     write_demo(folder / "facert-demo")
+    for name, frames in SHORTER.items():
+        path = folder / "facert-demo" / name
+        take = facert.read_take(path)
+        kept = range(frames)
+        part = replace(
+            take,
+            time=take.time[kept],
+            source=take.source.with_matrix(take.source.matrix[kept]),
+            params=take.params[kept],
+        )
+        facert.write_take(part, path, overwrite=True)
     model = facert.train(facert.read_take(folder / "facert-demo" / "training.h5"))
     model.save(folder / "model.safetensors")
     result = model.retarget(facert.read_take(folder / "facert-demo" / "performance.h5"))

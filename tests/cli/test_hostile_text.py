@@ -117,7 +117,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "render": ("render {.result.h5} {sheet.svg} --rig {.rig.h5}",
                "render {.result.h5} {clip.gif} --rig {.rig.h5} --size 64"),
     "plot": ("plot {.result.h5} {curves.svg}", "plot {.result.h5} {curves.png}"),
-    "eval": ("eval {.h5} --methods nearest --labels 4,5 --json {eval.json} --plot {eval.svg}",),
+    "eval": ("eval {.h5} --methods nearest --labels 4,5 --jobs 1 --json {eval.json} "
+             "--plot {eval.svg}",),
     "report": ("report {reported} -o {out.html}",),
     "convert": ("convert {.h5} {made.csv}", "convert {.weights.h5} {made.json}",
                 "convert {.weights.h5} {made2.csv}",

@@ -60,8 +60,8 @@ COMMANDS = {
     "live --record": ("kept.h5", ("live", "--in", "take:take.h5", "-m", "model.safetensors",
                                   "--out", "h5:new.h5", "--record", "kept.h5")),
     "demo": ("training.h5", ("demo", ".")),
-    "eval": ("kept.json", ("eval", "posed.h5", "--methods", "ridge", "--repeats", "1", "--json",
-                           "kept.json")),
+    "eval": ("kept.json", ("eval", "posed.h5", "--methods", "ridge", "--repeats", "1",
+                           "--jobs", "1", "--json", "kept.json")),
     "eval over a c3d": ("kept.c3d", ("eval", "posed.h5", "--json", "kept.c3d")),
     "export-script": ("kept.csv", ("export-script", "maya", "-o", "kept.csv")),
 }  # fmt: skip
