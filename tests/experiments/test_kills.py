@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
     return place
 
 
-@pytest.mark.parametrize(("name", "count"), [("convert", 4), ("retarget", 1)])
+@pytest.mark.parametrize(("name", "count"), [("convert", 4), ("retarget", 2)])
 def test_ended_commands_leave_nothing_behind(folder, name, count):
     said = []
     found = kill(name, folder, count, random.Random(count), said.append)

@@ -35,7 +35,7 @@ def test_frames_of_json_are_counted(
 def test_an_object_of_more_names_than_a_face_has_is_no_frame(tmp_path: Path) -> None:
     names = ",".join(f'"k{i}":1' for i in range(50_000))
     (tmp_path / "a.json").write_text(f'[{{"time":0,"others":{{{names}}}}}]')
-    with pytest.raises(InputError, match="at most 49216 columns, found 50000"):
+    with pytest.raises(InputError, match="at most 49216 columns, found 5000"):
         read_any(tmp_path / "a.json")
 
 

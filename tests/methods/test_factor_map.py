@@ -82,14 +82,20 @@ def test_three_labels_make_three_folds():
     assert [len(test) for _, test in ranked_folds(X)] == [1, 1, 1]
 
 
+def validated(labelled, unlabelled):
+    """Cross-validated poses beside the maps of all labels."""
+    maps = BaseMaps.learn(labelled, unlabelled)
+    return cross_validated_poses(labelled, unlabelled, maps)
+
+
 def test_cross_validated_poses_do_not_depend_on_the_labels_own_poses():
     labelled, unlabelled = data()
-    predicted = cross_validated_poses(labelled, unlabelled)
+    predicted = validated(labelled, unlabelled)
     assert predicted.shape == (3, 11, 5)
     _, test = ranked_folds(labelled.X)[2]
     poses = labelled.Y.copy()
     poses[test] = 99.0
-    again = cross_validated_poses(Labelled(labelled.X, poses), unlabelled)
+    again = validated(Labelled(labelled.X, poses), unlabelled)
     np.testing.assert_array_equal(again[:, test], predicted[:, test])
     others = np.delete(np.arange(11), test)
     assert (np.abs(again[:, others] - predicted[:, others]).max(axis=(1, 2)) > 0.1).all()
@@ -97,7 +103,7 @@ def test_cross_validated_poses_do_not_depend_on_the_labels_own_poses():
 
 def test_cross_validated_poses_are_those_of_maps_without_the_fold():
     labelled, unlabelled = data()
-    predicted = cross_validated_poses(labelled, unlabelled)
+    predicted = validated(labelled, unlabelled)
     train, test = ranked_folds(labelled.X)[0]
     frames = np.vstack([unlabelled.X, labelled.X[test]])
     rest = Labelled(labelled.X[train], labelled.Y[train])
