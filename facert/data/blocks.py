@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from facert.data.arrays import IntArray
+from facert.data.arrays import FloatArray, IntArray
 
 AT_ONCE = 1 << 18
 """Numbers of a block."""
@@ -19,6 +19,14 @@ def blocks(count: int, across: int, at_once: int = AT_ONCE) -> Iterator[slice]:
     width = max(at_once // max(across, 1), LEAST)
     for start in range(0, count, width):
         yield slice(start, min(start + width, count))
+
+
+def in_blocks(
+    work: Callable[[FloatArray], FloatArray], X: FloatArray, across: int, at_once: int = AT_ONCE
+) -> FloatArray:
+    """What is worked out of each row (n, d), where `across` numbers are made for one on the way."""
+    parts = [work(X[rows]) for rows in blocks(len(X), across, at_once)]
+    return parts[0] if len(parts) == 1 else np.concatenate([work(X[:0]), *parts])
 
 
 def spread(count: int, most: int) -> IntArray:

@@ -11,8 +11,9 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
 from facert.data.arrays import FloatArray
+from facert.data.blocks import in_blocks
 from facert.data.memory import FLOAT, require_memory
-from facert.methods.regression import Map, SupervisedRegression
+from facert.methods.regression import MOST_KERNELS, Map, SupervisedRegression
 
 # Enough for a frame that was posed twice, differently, to be no contradiction.
 SMOOTHING = 1e-3
@@ -68,7 +69,10 @@ class NearestMap(Map):
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
-        return self.Y[cdist(X, self.X, "sqeuclidean").argmin(axis=1)], None
+        return in_blocks(self._poses, X, len(self.X), MOST_KERNELS), None
+
+    def _poses(self, X: FloatArray) -> FloatArray:
+        return np.asarray(self.Y[cdist(X, self.X, "sqeuclidean").argmin(axis=1)])
 
 
 class Nearest(SupervisedRegression):

@@ -15,7 +15,7 @@ from facert.data.arrays import FloatArray
 from facert.data.memory import FLOAT, require_memory
 from facert.errors import InputError
 from facert.methods.base import Labelled
-from facert.methods.regression import Map, Variance
+from facert.methods.regression import MOST_KERNELS, Map, Variance
 from facert.methods.waiting_frames import WaitingFrames
 from facert.models.gp.hyperparameters import maximise_likelihood
 from facert.models.gp.jitter import inverted, lower_factor
@@ -25,7 +25,6 @@ from facert.models.threads import SMALL
 from facert.models.whitening import whitening
 
 POWER = 0.5  # half-whitening
-MOST_KERNELS = 2**23  # numbers of kernels between frames and labels that are held at a time
 
 
 @dataclass(frozen=True, eq=False)

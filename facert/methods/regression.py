@@ -27,6 +27,8 @@ from facert.settings import Settings
 
 log = logging.getLogger(__name__)
 
+MOST_KERNELS = 2**23
+"""Numbers of kernels between frames and labels that are held at a time."""
 Variance = Callable[[], FloatArray]
 """Works out the variance of poses, (T, d_y), when asked: in a stream, it hardly ever is."""
 

@@ -12,8 +12,9 @@ from scipy.spatial.distance import cdist
 from sklearn import svm
 
 from facert.data.arrays import FloatArray, IntArray
+from facert.data.blocks import in_blocks
 from facert.methods.folds import blocked_folds
-from facert.methods.regression import Map, SupervisedRegression
+from facert.methods.regression import MOST_KERNELS, Map, SupervisedRegression
 from facert.models.kernels import squared_exponential
 
 # The inverse width is relative to the mean squared distance of two labels; ε and C to the standard
@@ -43,10 +44,13 @@ class PackedMap(Map):
 
     def __call__(self, X: FloatArray) -> tuple[FloatArray, None]:
         """Poses of frames X (T, d_x), (T, d_y)."""
+        return in_blocks(self._poses, X, self.duals[..., 0].size, MOST_KERNELS), None
+
+    def _poses(self, X: FloatArray) -> FloatArray:
         squared = cdist(X, self.X, "sqeuclidean")[:, None, :]
         k = squared_exponential(squared, 2.0 * self.inverse_widths[:, None])
         packed = self.duals.reshape(-1, self.duals.shape[2])
-        return k.reshape(len(X), len(packed)) @ packed + self.offset, None
+        return np.asarray(k.reshape(len(X), len(packed)) @ packed + self.offset)
 
 
 class _Choice(NamedTuple):

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.memory import require_square
 from facert.models.kernels import squared_exponential
 
 TIED = 0.05  # ε: near markers are tied a little, even where noise hides how they move
@@ -38,7 +39,13 @@ def two_groups(frames: FloatArray) -> BoolArray:
     -------
     array of bool, shape (M,)
         True for one group. With fewer than `FEWEST`, all are in the other.
+
+    Raises
+    ------
+    InputError
+        When there are so many that what each pair does together takes too much memory.
     """
+    require_square(frames.shape[1], "/source", "Give the regions by names: --regions FILE.", 18)
     if frames.shape[1] < FEWEST:
         return np.zeros(frames.shape[1], dtype=np.bool_)
     if frames.ndim == 2:

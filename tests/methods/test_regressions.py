@@ -1,5 +1,7 @@
 """What is particular to each of the regressions beside Gaussian processes."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
@@ -10,7 +12,7 @@ from facert.data.arrays import rms
 from facert.errors import InputError
 from facert.methods.base import Labelled, Unlabelled
 from facert.methods.folds import blocked_folds
-from facert.methods.interpolation import SMOOTHING
+from facert.methods.interpolation import SMOOTHING, NearestMap
 from facert.methods.registry import make_method
 from facert.methods.svr import PackedMap
 from facert.models.partial_least_squares import LeastSquaresComponents
@@ -158,3 +160,21 @@ def test_fewer_than_three_labels_are_refused(name):
     X, Y = linear_data()
     with pytest.raises(InputError, match=f"at least 3 posed frames for {name}, found 2"):
         fitted(name, X[:2], Y[:2])
+
+
+def test_frames_and_poses_are_not_compared_all_at_once():
+    rng = np.random.default_rng(0)
+    X, poses = rng.normal(size=(20_000, 1)), rng.normal(size=(20_000, 2))
+    frames = rng.normal(size=(3_000, 1))
+    maps = [
+        NearestMap(X, poses),
+        PackedMap(X, np.array([1.0]), poses[None], np.zeros(2)),
+    ]
+    for map_ in maps:
+        tracemalloc.start()
+        found, _ = map_(frames)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 250e6  # all numbers of a kernel take 480 MB
+        np.testing.assert_allclose(found[-5:], map_(frames[-5:])[0], rtol=1e-9)
+        assert map_(frames[:0])[0].shape == (0, 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,17 @@ def test_a_marker_far_away_is_beyond_it(face, head, units):
     expected = np.zeros((400, 20), dtype=bool)
     expected[10:20, 7] = expected[15:30, 3] = True
     np.testing.assert_array_equal(far[:, ::3], expected)
+
+
+def test_of_very_many_markers_some_tell_the_size_of_the_face():
+    places = np.random.default_rng(0).normal(size=(20_000, 3))
+    tracemalloc.start()
+    reach = Reach.of(Normalisation(places.ravel(), 1.0), "markers")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 50e6
+    few = Reach.of(Normalisation(places[:600].ravel(), 1.0), "markers")
+    assert reach.limit == pytest.approx(few.limit, rel=0.05)
 
 
 @pytest.mark.parametrize("scale", [1.0, 100.0])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facert.data.arrays import BoolArray, FloatArray
+from facert.data.blocks import spread
 from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind
 from facert.preprocess.faults.absurd import NATURAL, REACH
@@ -16,6 +17,8 @@ SPREAD = 4.0
 """Times the largest standard deviation in training, that a marker may go beside the face's size."""
 LEAST = 12.0
 """The same for weights, at least: they may have rested in training."""
+LOOKED_AT = 600
+"""Markers that tell the size of the face, at most."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,7 @@ class Reach:
             unit = NATURAL[0] if units.scale <= NATURAL[0] else NATURAL[1]
             return cls(kind, max(REACH * unit / units.scale, LEAST))
         places = units.mean.reshape(-1, 3)
+        places = places[spread(len(places), LOOKED_AT)]
         size = float(np.median(np.linalg.norm(places[:, None] - places, axis=2)))
         return cls(kind, size / units.scale + SPREAD)
 
