@@ -8,10 +8,12 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from types import ModuleType
 from typing import Annotated, Any
 
 import typer
+import typer.main
 
 from facert.cli.commands import (
     clean,
@@ -172,11 +174,17 @@ for panel, modules in PANELS.items():
             app.command(name, cls=Command, rich_help_panel=panel)(module.command)
 
 
+@cache
+def _command() -> Any:
+    """The commands as Typer makes them: of one process, once, as that takes its time."""
+    return typer.main.get_command(app)
+
+
 def run() -> None:
     """Run the command line, and exit with what became of it."""
     console.show_any_letter()
     try:
-        app()
+        _command()()
     except Exception as error:
         if is_unexpected(error) and console.log.isEnabledFor(logging.DEBUG):
             console.err.print(trace(error))

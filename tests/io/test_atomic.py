@@ -18,7 +18,7 @@ def test_the_file_appears_under_its_name_and_nothing_else_stays(tmp_path):
 
 
 def test_an_existing_file_is_kept_unless_overwriting_is_asked_for(tmp_path):
-    path = tmp_path / "page.html"
+    path = tmp_path / "page.bmp"
     path.write_text("old")
     with pytest.raises(OutputExistsError, match="--overwrite"), replacing(path) as temporary:
         temporary.write_text("new")
@@ -30,7 +30,7 @@ def test_an_existing_file_is_kept_unless_overwriting_is_asked_for(tmp_path):
 
 @pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
 def test_a_failing_writer_leaves_no_trace(tmp_path, failure):
-    path = tmp_path / "page.html"
+    path = tmp_path / "page.bmp"
     path.write_text("old")
 
     def write_half():
