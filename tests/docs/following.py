@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,12 @@ def stand_in() -> dict[str, Any]:
     return runpy.run_path(str(ROOT / STAND_IN))
 
 
+@cache
+def whole_command() -> Any:
+    """``facert`` with all its commands."""
+    return typer.main.get_command(app.app)
+
+
 def check_options(line: str) -> None:
     """Parse a command of facert without running it."""
     name, command, arguments = _resolved(line)
@@ -151,7 +158,7 @@ def unknown_options(line: str) -> list[str]:
 
 def all_options() -> set[str]:
     """The options of all commands."""
-    found, commands = {"--help"}, [typer.main.get_command(app.app)]
+    found, commands = {"--help"}, [whole_command()]
     while commands:
         command: Any = commands.pop()
         found |= {option for parameter in command.params for option in parameter.opts}
@@ -163,7 +170,7 @@ def all_options() -> set[str]:
 def _resolved(line: str) -> tuple[str, Any, list[str]]:
     """Name and object of the command in a line, and its arguments."""
     name, *arguments = shlex.split(line, comments=True)
-    command: Any = typer.main.get_command(app.app)
+    command = whole_command()
     while isinstance(command, typer.core.TyperGroup) and arguments and arguments[0][0] != "-":
         name = arguments.pop(0)
         assert name in command.commands, f"no such command: {line}"
