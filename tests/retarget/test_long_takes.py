@@ -9,7 +9,7 @@ import pytest
 import facert
 from facert.retarget import retargeter
 
-NEAR = {"rtol": 1e-9, "atol": 1e-12}
+NEAR = {"rtol": 1e-9, "atol": 1e-9}
 
 
 @pytest.fixture(name="take", scope="module")
