@@ -35,7 +35,7 @@ WRITTEN = 2
 VARIED = 10
 """The others have at least so many values: a weight of two values may be a switch."""
 LOOKED_AT, MANY = 600, 1_000_000
-"""Of more markers, so many tell where the middle is; and, of very many positions, those of as many
+"""Of more markers, the middle is found from so many; and, of very many positions, those of as many
 frames how far markers usually are from it."""
 USUAL, MOST = 0.75, 0.98
 """Quantiles of a column of weights, and of columns in general."""

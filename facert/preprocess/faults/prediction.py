@@ -122,11 +122,11 @@ class _Joint:
 
 @dataclass(frozen=True, eq=False)
 class _Directions:
-    """Leading directions, by which some markers tell where all are."""
+    """Leading directions, by which some markers predict all."""
 
     factors: MotionFactors  # Of the coordinates, in `units`
     units: Normalisation
-    # The coordinates that they are told by; of those that were never seen the mean is NaN
+    # The coordinates that they are found from; of those that were never seen the mean is NaN
     part: IntArray
 
     @classmethod
@@ -144,7 +144,7 @@ class _Directions:
         return cls(factors, units, np.flatnonzero(ever)[part_of(X.shape[1])])
 
     def fill(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
-        filled, z = markers.copy(), self._told(markers, suspect)
+        filled, z = markers.copy(), self._factors_of(markers, suspect)
         for rows in blocks(len(markers), 3 * markers.shape[1], IN_MEMORY):
             if suspect[rows].any():
                 there = suspect[rows]
@@ -152,14 +152,14 @@ class _Directions:
         return filled
 
     def off(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
-        result, z = np.empty(suspect.shape), self._told(markers, suspect)
+        result, z = np.empty(suspect.shape), self._factors_of(markers, suspect)
         for rows in blocks(len(markers), 3 * markers.shape[1], IN_MEMORY):
             away = self._placed(z[rows])
             away -= markers[rows]
             result[rows] = lengths(away)
         return np.nan_to_num(result, copy=False)
 
-    def _told(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
+    def _factors_of(self, markers: FloatArray, suspect: BoolArray) -> FloatArray:
         """The factors of each frame (T, M, 3) by what is not suspect, (T, q)."""
         own = Normalisation(self.units.mean[self.part], self.units.scale)
         factors, z = self.factors.at(self.part), np.empty((len(markers), self.factors.count))

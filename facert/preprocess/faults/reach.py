@@ -10,15 +10,13 @@ from facert.data.arrays import BoolArray, FloatArray
 from facert.data.blocks import spread
 from facert.data.normalisation import Normalisation
 from facert.data.take import SourceKind
-from facert.preprocess.faults.absurd import NATURAL, REACH
+from facert.preprocess.faults.absurd import LOOKED_AT, NATURAL, REACH
 from facert.preprocess.faults.quantiles import median
 
 SPREAD = 4.0
 """Times the largest standard deviation in training, that a marker may go beside the face's size."""
 LEAST = 12.0
 """The same for weights, at least: they may have rested in training."""
-LOOKED_AT = 600
-"""Markers that tell the size of the face, at most."""
 
 
 @dataclass(frozen=True)
